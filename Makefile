@@ -81,10 +81,11 @@ test-slow: $(BUILD_STAMP) ## the slow tests
 	$(CARGO) test --release $(RUST_TESTED) -- --ignored
 	$(BIN)/pytest -m slow
 
-fuzz: $(BUILD_STAMP) ## random graphs in native code and interpreter; damaged bytes of systems; N random systems from SEED on, in two processes, and 400 degenerate starts
+fuzz: $(BUILD_STAMP) ## random graphs in native code and interpreter; damaged bytes of systems; N random systems from SEED on, in two processes, and 400 degenerate starts; their derivatives against differences
 	EXPR_TEST_SEED=$(SEED) $(CARGO) test --release -p filippov-expr --test fuzz -- --ignored
 	$(CARGO) test --release -p filippov --test saved_systems -- --ignored
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m fuzz --n $(N) --seed $(SEED)
+	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m fuzz.derivatives --n $(N) --seed $(SEED)
 
 decisions: $(BUILD_STAMP) ## record the corpus of decisions again, see CONTRIBUTING
 	$(PY) scripts/record_decisions.py

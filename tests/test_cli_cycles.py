@@ -86,7 +86,8 @@ def test_special_points_are_a_table(model: Path, capsys: pytest.CaptureFixture[s
     assert list(written[0]) == ["omega", "y", "v", "period", "stable", "admissible", "modes"]
     omega = np.array([float(row["omega"]) for row in written])
     assert (omega[0], omega[-1]) == (0.15, 0.7)
-    np.testing.assert_allclose([float(row["period"]) for row in written] * omega, 2 * np.pi, rtol=1e-12)
+    # Newton's method ends with steps below 1e-9 of the cycle.
+    np.testing.assert_allclose([float(row["period"]) for row in written] * omega, 2 * np.pi, rtol=1e-9)
     assert {row["stable"] for row in written} == {"True"}
 
 
@@ -107,7 +108,8 @@ def test_equilibria_of_one_of_several_systems(model: Path, capsys: pytest.Captur
     codes = [line.split()[:2] for line in printed.splitlines() if line.startswith("BE")]
     assert codes == [["BE", "0.8"], ["BE", "1"]]
     assert (
-        main(["continue", "model.py", "--system", "fish", *arguments, "--mode", "0", "--param", "a=17/20"]) == 0
+        main(["continue", "model.py", "--system", "fish", *arguments, "--mode", "0", "--param", "a=17/20"])
+        == 0
     )
     printed = capsys.readouterr().out
     assert "equilibrium: stable pseudo-equilibrium in mode 0" in printed
@@ -131,9 +133,8 @@ def test_pictures_of_branches(model: Path) -> None:
 
 
 def test_a_stored_branch_is_read_again(model: Path) -> None:
-    saving = pytest.importorskip("filippov.cycles.saving")
     assert main([*CONTINUE, "--store", "branch.json", "--quiet"]) == 0
-    branch = saving.load_branch("branch.json", oscillator())
+    branch = fl.cycles.load_branch("branch.json", oscillator())
     assert [special.code for special in branch.special] == ["EP", "AS", "CS", "EP"]
 
 
@@ -150,7 +151,7 @@ def test_a_stored_branch_is_read_again(model: Path) -> None:
         (["cycle", "model.py", "--param", "G=1"], "no parameter 'G'"),
         (["cycle", "model.py", "--period", "2*pi/w"], "--period: no parameter 'w'"),
         (["cycle", "model.py", "--period", "f(2)"], "--period: 'f(2)' has more than"),
-        (["cycle", "model.py", "--period", "-1"], "the period is a positive number"),
+        (["cycle", "model.py", "--period", "-1"], "a positive number is needed"),
         (["cycle", "model.py", "--transient", "-1"], "transient"),
         (["cycle", "model.py", "--phase", "y", "v"], "--phase: needs --plot"),
         (["cycle", "model.py", "--plot", "o.png", "--phase", "y"], "--phase: two states are needed, not 1"),

@@ -1,6 +1,7 @@
 """Branches of cycles and equilibria: the points of K3 to 1e-8, reasons in words, agreement with simulation.
 
-References: Piiroinen, Kuznetsov, ACM TOMS 34 (2008) 13; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: Piiroinen, Kuznetsov, ACM TOMS 34 (2008) 13; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and
+Chaos 13 (2003) 2157.
 """
 
 from __future__ import annotations
@@ -49,12 +50,19 @@ def test_branch_of_the_dry_friction_oscillator(dry: fl.Branch) -> None:
     crossing, adding = dry.special["CS"][0], dry.special["AS"][0]
     assert abs(1 / crossing.params["omega"] - 1.866523638121) < 1e-10
     assert abs(1 / adding.params["omega"] - 4.823126106845) < 1e-10
-    assert abs(crossing.params["omega"] - float(POINTS["dry_friction_crossing_sliding"]["points"][0]["omega"])) < 1e-10
-    assert abs(adding.params["omega"] - float(POINTS["dry_friction_adding_sliding"]["points"][0]["omega"])) < 1e-10
+    assert (
+        abs(crossing.params["omega"] - float(POINTS["dry_friction_crossing_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
+    assert (
+        abs(adding.params["omega"] - float(POINTS["dry_friction_adding_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
     assert crossing.surface == adding.surface == "x[1]"
     data = dry.data
     assert data.sizes["point"] == len(dry)
-    assert bool(data.admissible.all()) and bool(data.stable.all())
+    assert bool(data.admissible.all())
+    assert bool(data.stable.all())
     sticks = data.n_zero.values
     assert np.array_equal(sticks == 1, data.omega.values < crossing.params["omega"])
     assert np.max(data.residual.values) < 1e-9
@@ -208,7 +216,9 @@ def test_monitors_are_kept_and_their_zeros_found(dry: fl.Branch) -> None:
 
 def test_wrong_arguments_are_named() -> None:
     cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
-    with pytest.raises(fl.InputError, match="parameter: the system has no parameter 'omga'; did you mean 'omega'"):
+    with pytest.raises(
+        fl.InputError, match="parameter: the system has no parameter 'omga'; did you mean 'omega'"
+    ):
         fl.continuation(cycle, "omga", (0.5, 0.9))
     with pytest.raises(fl.InputError, match=r"bounds: the start has omega = 0.7, outside of \(0.8, 0.9\)"):
         fl.continuation(cycle, "omega", (0.8, 0.9))
@@ -231,7 +241,7 @@ def test_no_cycle_is_a_reason_in_words() -> None:
     with pytest.raises(fl.ModelError, match="comes to rest"):
         fl.limit_cycle(decay, [1.0, 1.0])
     growth = fl.System(lambda t, x: [x[0] + x[1], x[1] - x[0]], n=2)
-    with pytest.raises(fl.ModelError, match="grows without bound|ends before"):
+    with pytest.raises(fl.ModelError, match=r"grows without bound|ends before"):
         fl.limit_cycle(growth, [1.0, 1.0])
     lorenz = fl.System(
         lambda t, x: [10 * (x[1] - x[0]), x[0] * (28 - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]], n=3
@@ -254,7 +264,8 @@ def test_cycles_of_twice_the_period_begin_at_a_period_doubling() -> None:
     ratio = doubled.values("period") * doubled.values("omega") / (2 * np.pi)
     np.testing.assert_allclose(ratio, 2.0, atol=1e-9)
     assert np.all(doubled.values("omega")[1:] > doubling.params["omega"])
-    assert doubled.stable[1] and not doubled.stable[-1]
+    assert doubled.stable[1]
+    assert not doubled.stable[-1]
     # A run comes to the doubled cycle.
     omega = 0.5 * (doubling.params["omega"] + doubled.special["PD"][0].params["omega"])
     there = doubled.at(omega=omega)
@@ -298,3 +309,77 @@ def test_branches_are_saved_and_go_on_from_any_point(tmp_path: Any) -> None:
     path.write_text("[1, 2]")
     with pytest.raises(fl.InputError, match=r"branch\.json"):
         fl.cycles.load_branch(path, system)
+
+
+def test_a_parameter_that_does_not_matter_gives_a_straight_branch() -> None:
+    def fun(t: float, x: Any, omega: float, q: float) -> list[Any]:
+        return [x[1], -x[0] + np.sin(omega * t) - 0.4 * np.sign(x[1]) + 0 * q]
+
+    system = fl.System(fun, n=2, params={"omega": 0.7, "q": 1.0})
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "q", (0.0, 2.0))
+    assert codes(branch) == ["EP", "EP"]
+    starts = np.array([point.state.at(0.0) for point in branch.points])
+    assert np.max(np.ptp(np.abs(starts), axis=0)) < 1e-10
+
+
+def relay_loop() -> fl.System:
+    return fl.System(
+        lambda t, x, k=1.0: [x[1], x[2], -2 * x[2] - 3 * x[1] - k * np.sign(x[0] + 0.2 * x[1])], n=3
+    )
+
+
+def belt() -> fl.System:
+    def fun(t: float, x: Any, vdr: float = 0.2, delta: float = 3.0) -> list[Any]:
+        slip = x[1] - vdr
+        return [x[1], -x[0] - np.sign(slip) / (1 + delta * abs(slip))]
+
+    return fl.System(fun, n=2)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "name", "bounds"),
+    [
+        (friction(omega=0.7), [1.0, 2.0], "omega", (0.3, 0.9)),
+        (belt(), [0.1, 0.0], "vdr", (0.1, 0.4)),
+        (relay_loop(), [0.1, 0.0, 0.0], "k", (0.5, 2.0)),
+        (harvest("harvest_cycle", alpha="0.6"), [0.19, 0.59], "alpha", (0.46, 0.8)),
+        (impacts("impact_fold", omega="1.6", s="-0.5"), [-0.499, 2.2], "omega", (1.3, 1.7)),
+    ],
+    ids=["friction", "belt", "relay", "harvest", "impact"],
+)
+def test_branches_agree_with_simulation(system: fl.System, start: Any, name: str, bounds: Any) -> None:
+    branch = fl.continuation(fl.limit_cycle(system, start), name, bounds)
+    values = branch.values(name)
+    for value_ in np.linspace(*bounds, 7)[1:-1]:
+        k = int(np.argmin(np.abs(values - value_)))
+        near = branch.points[k].state
+        if not near.is_stable:
+            continue
+        # A run from the stable cycle stays there, ..
+        cycle = branch.at(**{name: value_})
+        t, x = cycle.inside()
+        turns = 10
+        run = system.solve((t, t + turns * cycle.period), x, params={name: value_}, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(run.y[:, -1], x, atol=1e-6)
+        # .. and one from beside it comes back.
+        again = fl.limit_cycle(system, x * (1 + 1e-3), {name: value_}, t0=t if cycle.is_forced else 0.0)
+        assert abs(again.period - cycle.period) < 1e-8
+
+
+def test_an_interrupt_keeps_the_part_that_was_computed(tmp_path: Any) -> None:
+    calls = []
+
+    def slow(state: Any) -> float:
+        calls.append(1)
+        if len(calls) > 8:
+            raise KeyboardInterrupt
+        return 1.0
+
+    path = tmp_path / "part.json"
+    cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fl.continuation(cycle, "omega", (0.6, 0.9), monitor={"slow": fl.cycles.of_state(slow)}, store=path)
+    partial = caught.value.partial  # type: ignore[attr-defined]
+    assert 2 < len(partial) < 12
+    assert "interrupted" in partial.reason
+    assert len(fl.cycles.load_branch(path, friction(omega=0.7))) == len(partial)

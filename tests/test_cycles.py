@@ -1,4 +1,4 @@
-"""Limit cycles: those of the references K1 to 22 digits and more, unstable ones, laws with memory, and what is none."""
+"""Limit cycles: those of the references K1, to 22 digits and more."""
 
 from __future__ import annotations
 
@@ -123,3 +123,95 @@ def test_impact_oscillators(name: str) -> None:
         by_time = omega * (found.times[0] - turns * found.period)
         own = (impact.time - turns * cycle.period) * (row["parameter"] == "omega")
         assert abs(by_time + own - float(row["theta"])) < 1e-7
+
+
+def test_laws_clocks_and_contact() -> None:
+    # Closed form: between the thresholds the temperature is an exponential.
+    def room(t: float, x: Any, low: float = 19.0, high: float = 21.0) -> list[Any]:
+        return [-(x[0] - 10) / 20 + (1 - fl.hysteresis(x[0], low, high)) / 2]
+
+    cycle = fl.limit_cycle(fl.System(room, n=1), [20.0])
+    exact = 20 * math.log(11 / 9) + 20 * math.log(11 / 9)  # towards 10 and towards 30
+    assert abs(cycle.period - exact) < 1e-10
+    assert cycle.n_zero == 0 or np.all(cycle.nontrivial == 0)
+    assert abs(cycle.derivative("high").period - (20 / 11 + 20 / 9)) < 1e-8
+
+    # A kick at every tick of a clock, and friction.
+    def mass(t: float, x: Any) -> list[Any]:
+        return [x[1], -x[0] - 0.1 * x[1] - 0.2 * np.sign(x[1])]
+
+    kick = fl.Reset(map=lambda t, x: [x[0], x[1] + 1.0], period=2.0)
+    kicked = fl.System(mass, n=2, resets=kick)
+    cycle = fl.limit_cycle(kicked, [0.5, 0.5])
+    assert abs(cycle.period - 2.0) < 1e-12
+    assert cycle.is_admissible
+    run = kicked.solve((0, 20), cycle.at(0.0, before=True), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(run.sol(20.0, side="left"), cycle.at(0.0, before=True), atol=1e-8)
+
+    # A body without restitution on a shaking table rests on it, leaves it, and comes back.
+    def body(t: float, x: Any, a: float = 1.2) -> list[Any]:
+        return [x[1], -1.0]
+
+    table = fl.Reset(
+        lambda t, x, a: x[0] - a * np.sin(t), lambda t, x, a: [x[0], a * np.cos(t)], direction="down"
+    )
+    cycle = fl.limit_cycle(fl.System(body, n=2, resets=table), [0.5, 0.0])
+    assert abs(cycle.period - 2 * np.pi) < 1e-10
+    assert cycle.n_zero == 2
+    assert cycle.is_admissible
+    leaves = next(leg.ending for leg in cycle.itinerary.legs if leg.mode[0] == 0 and leg.ending)
+    assert abs(math.remainder(leaves.time - math.asin(1 / 1.2), 2 * np.pi)) < 1e-10
+
+
+def test_a_smooth_cycle_has_the_period_of_the_literature() -> None:
+    system = fl.System(lambda t, x, mu=1.0: [x[1], mu * (1 - x[0] ** 2) * x[1] - x[0]], n=2)
+    cycle = fl.limit_cycle(system, [1.0, 0.0])
+    assert abs(cycle.period - 6.663286859323) < 1e-9  # Andersen, Geer, SIAM J. Appl. Math. 42 (1982) 678
+    assert cycle.itinerary.legs[0].ending is None
+
+
+def test_unstable_cycles_are_found_from_a_guess() -> None:
+    def ring(t: float, z: Any, a: float = 0.3) -> list[Any]:
+        x, y = z
+        grow = a * (x**2 + y**2 - 1)
+        return [x * grow - 2 * y, y * grow + 2 * x]
+
+    cycle = fl.limit_cycle(fl.System(ring, n=2), [0.98, 0.05], period=3.1, transient=0)
+    assert abs(cycle.period - np.pi) < 1e-10
+    assert abs(cycle.nontrivial[0].real - np.exp(0.6 * np.pi)) < 1e-8
+    assert not cycle.is_stable
+
+
+def test_a_chain_of_very_many_pieces_is_refused_in_words() -> None:
+    def fun(t: float, x: Any) -> list[Any]:
+        return [x[1], -x[0] + 0.2 * (1 - x[0] ** 2) * x[1] + 1e-3 * np.sign(np.sin(300 * x[0]))]
+
+    with pytest.raises(fl.ModelError, match="not followed piece by piece"):
+        fl.limit_cycle(fl.System(fun, n=2), [1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"transient": -1}, "transient"),
+        ({"period": -1.0}, "period: a positive number"),
+        ({"section": 3}, "section"),
+        ({"itinerary": "+-"}, "itinerary"),
+        ({"rtol": -1.0}, "rtol"),
+    ],
+)
+def test_wrong_arguments_are_named(options: dict[str, Any], message: str) -> None:
+    system = fl.System(lambda t, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], n=2)
+    with pytest.raises(fl.InputError, match=message):
+        fl.limit_cycle(system, [1.0, 0.0], **options)
+    with pytest.raises(fl.InputError, match="system"):
+        fl.limit_cycle(lambda t, x: x, [1.0, 0.0])  # type: ignore[arg-type]
+
+
+def test_black_boxes_are_refused_by_name() -> None:
+    def called(t: float, x: Any) -> list[Any]:
+        return [x[1], -x[0] - 0.5 * np.sign(x[1]) + np.interp(1.0, [0, 2], [0, 2]) * math.sin(hash(str(t)))]
+
+    box = fl.System(called, n=2, surfaces=[lambda t, x: x[1]])
+    with pytest.raises(fl.InputError, match="derivatives"):
+        fl.limit_cycle(box, [1.0, 0.0])

@@ -78,6 +78,8 @@ def test_lost_derivatives_are_nan_in_files_too(tmp_path: Path) -> None:
         assert np.isnan(back.derivative.isel(t=-1)).all()
 
 
+# The second impact is at t = 2 exactly.
+@pytest.mark.filterwarnings("ignore:one_sided:filippov.FilippovWarning")
 def test_at_a_jump_they_are_right_limits_as_the_states_are() -> None:
     bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.5 * x[1]], direction="down")
     sol = fl.System(lambda t, x: [x[1], -1.0], n=2, resets=bounce).solve((0, 2), [0.5, 0.0], wrt="y0")

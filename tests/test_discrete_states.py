@@ -216,6 +216,12 @@ def counted(t: float, x: Any, n: float) -> list[Any]:
             r"set\['n'\] must return a real number",
         ),
         (
+            lambda: fl.System(
+                counted, n=1, discrete={"n": 1}, resets=fl.Reset(times=[1], set={"n": lambda t, x: 1 / 0})
+            ).solve((0, 2), [0.0]),
+            "resets: entry 0 .* raised ZeroDivisionError at the start",
+        ),
+        (
             lambda: fl.System(counted, n=1, discrete={"n": 1}, outputs={"n": lambda t, x: 0.0}),
             "outputs: 'n' is the name of something else",
         ),

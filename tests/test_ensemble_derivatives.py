@@ -152,9 +152,6 @@ def test_what_single_runs_refuse() -> None:
     back = fl.Reset(lambda t, x: x[0], lambda t, x: [number(x[0]) + 1.0], name="back")
     with pytest.raises(fl.InputError, match="wrt: the map of the reset 'back' is not traced"):
         fl.System(lambda t, x: [-1.0], n=1, resets=back).ensemble((0, 1), [[1.0]], wrt="y0")
-    geared = fl.System(lambda t, x, gear: [-gear * x[0]], n=1, discrete={"gear": 1})
-    with pytest.raises(fl.InputError, match="wrt: no derivatives pass through discrete states, here gear"):
-        geared.ensemble((0, 1), [[1.0]], wrt="y0")
     system = friction()
     with pytest.raises(fl.InputError, match="wrt: derivatives are followed forward in time only"):
         system.ensemble((1, 0), STARTS, wrt="y0")

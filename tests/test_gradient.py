@@ -257,14 +257,6 @@ def test_a_start_by_names_and_what_has_no_gradient() -> None:
         fl.gradient(OSCILLATOR, (1, 1), [1.0, 2.0], terminal=cost)
     with pytest.raises(fl.InputError, match="t1 < t0 is refused"):
         fl.gradient(OSCILLATOR, (1, 0), [1.0, 2.0], terminal=cost)
-    geared = fl.System(
-        lambda t, x, gear=1: [gear * np.sign(x[0])],
-        n=1,
-        discrete={"gear": 1},
-        resets=fl.Reset(times=[0.5], set={"gear": 2}),
-    )
-    with pytest.raises(fl.InputError, match="no derivatives pass through discrete states, here gear"):
-        fl.gradient(geared, (0, 1), [1.0], running=cost)
 
 
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")

@@ -161,8 +161,11 @@ def test_the_floor_of_a_parameter_is_a_constant_for_its_value():
 
 def test_events_may_use_the_clock_of_the_field():
     ramp = lambda t, x: fl.sawtooth(t, 0.3)  # noqa: E731
-    sol = fl.solve_ivp(lambda t, x: [ramp(t, x)], (0, 2), [0.0], events=lambda t, x: ramp(t, x) - 0.5)
+    middle = lambda t, x: ramp(t, x) - 0.5  # noqa: E731
+    rises, falls = fl.Event(middle, direction="up"), fl.Event(middle, direction="down")
+    sol = fl.solve_ivp(lambda t, x: [ramp(t, x)], (0, 2), [0.0], events=[rises, falls])
     assert np.allclose(sol.t_events[0], 0.15 + 0.3 * np.arange(7))
+    assert np.allclose(sol.t_events[1], 0.3 * np.arange(1, 7))  # it jumps through zero
 
 
 def test_systems_with_laws_travel_and_can_be_looked_at():

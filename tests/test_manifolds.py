@@ -7,7 +7,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
-from statements import cases, system_of
+from statements import cases, system_of, wall
 
 
 def harvest(alpha: float) -> fl.System:
@@ -94,6 +94,30 @@ def test_a_repelling_surface_is_left_through_the_regions() -> None:
         fl.manifold(rest, "stable")
 
 
+def test_on_a_curved_surface() -> None:
+    """On the unit circle the angle slides by its sine, from one end to the other."""
+
+    def fun(t: Any, x: Any) -> list[Any]:
+        side = np.sign(x[0] ** 2 + x[1] ** 2 - 1)
+        return [-x[1] * x[1] - 2 * side * x[0], x[0] * x[1] - 2 * side * x[1]]
+
+    saddle = fl.equilibrium(fl.System(fun, n=2), [1.0, 0.0], mode="0")
+    for curve in fl.manifold(saddle, length=4.0):
+        np.testing.assert_allclose(curve.points[:, -1], [-1.0, 0.0], atol=1e-6)
+        np.testing.assert_allclose(np.hypot(*curve.points), 1.0, atol=1e-12)
+        assert curve.length == pytest.approx(np.pi, abs=1e-5)
+
+
+def test_on_two_surfaces_it_is_along_both() -> None:
+    def fun(t: Any, x: Any) -> list[Any]:
+        return [0.5 * x[0] - x[0] ** 3, -np.sign(x[1]) + 0.1 * x[0], -np.sign(x[2]) + 0.1]
+
+    saddle = fl.equilibrium(fl.System(fun, n=3), [0.1, 0.0, 0.0], mode="00")
+    for curve in fl.manifold(saddle, length=2.0):
+        np.testing.assert_allclose(curve.points[:, -1], [curve.side * np.sqrt(0.5), 0.0, 0.0], atol=1e-6)
+        assert curve.reason.startswith("it comes to rest")
+
+
 def test_a_saddle_in_space_has_one_curve() -> None:
     system = fl.System(lambda t, x: [2.0 * x[0], -x[1] + x[2], -3.0 * x[2] - 0.1 * np.sign(x[2] - 5)], n=3)
     saddle = fl.equilibrium(system, [0.0, 0.0, 0.0])
@@ -136,6 +160,24 @@ class TestCycles:
             image = cycle.system.solve((0, 2 * np.pi), x, rtol=1e-11, atol=1e-12).y[:, -1]
             distance = np.min(np.linalg.norm(curve.points.T - image, axis=1))
             assert distance < 0.03  # the points are up to 0.04 from one another
+
+    def test_with_a_negative_multiplier_each_side_comes_back_after_two_returns(self) -> None:
+        """Between two period doublings the attractor of an impact oscillator is where the curves lead."""
+        case = cases("K3_bifurcations")["impact_flip"]
+        values = {"zeta": "0.05", "omega": "2.4", "r": "0.8", "s": "0"}
+        oscillator = system_of({**case, "parameters": values}, resets=wall())
+        cycle = fl.limit_cycle(oscillator, [0.001, 0.67], t0=2.49)
+        unstable = fl.continuation(cycle, "omega", (1.1, 2.5)).at(omega=1.15)
+        assert isinstance(unstable, fl.Cycle)
+        assert -1.3 < unstable.multipliers[0].real < -1.1
+        curves = fl.manifold(unstable, length=2.0)
+        times = 2 * np.pi / 1.15 * np.arange(300, 308)
+        run = oscillator.solve(
+            (0, times[-1]), [0.1, 1.3], {"omega": 1.15}, t_eval=times, rtol=1e-9, atol=1e-9
+        )
+        points = np.hstack([curve.points for curve in curves])
+        for x in run.y.T:
+            assert np.min(np.linalg.norm(points.T - x, axis=1)) < 0.01
 
     def test_without_forcing_it_lies_in_a_plane(self) -> None:
         def fun(t: Any, x: Any) -> list[Any]:

@@ -1,7 +1,7 @@
 """Cycles of random planar piecewise-linear systems, made so that they are known in closed form.
 
-In x > 0 and in x < 0 the motion is linear around an equilibrium of its own. Given both matrices, the times in each half plane and the two
-points on x = 0, the equilibria follow: p1 - e = exp(A T) (p0 - e).
+In x > 0 and in x < 0 the motion is linear around an equilibrium of its own. Given both matrices, the times in
+each half plane and the two points on x = 0, the equilibria follow: p1 - e = exp(A T) (p0 - e).
 """
 
 from __future__ import annotations
@@ -12,7 +12,11 @@ import filippov as fl
 import numpy as np
 import pytest
 
-NAMES = [f"{letter}{k}{side}" for side in "pm" for letter, k in (("a", 1), ("a", 2), ("a", 3), ("a", 4), ("e", 1), ("e", 2))]
+NAMES = [
+    f"{letter}{k}{side}"
+    for side in "pm"
+    for letter, k in (("a", 1), ("a", 2), ("a", 3), ("a", 4), ("e", 1), ("e", 2))
+]
 
 
 def halves(t: float, z: Any, **p: float) -> list[Any]:
@@ -50,7 +54,7 @@ def exponential(a: Any, t: float) -> Any:
 
 
 def known_cycle(random: np.random.Generator) -> Known | None:
-    """Return a random system with a known closed orbit of two pieces, or nothing if it is too flat to compare."""
+    """Return a random system with a known closed orbit of two pieces; nothing if that is too flat."""
     params: dict[str, float] = {}
     up, down = np.array([0.0, random.uniform(0.3, 2.0)]), np.array([0.0, -random.uniform(0.3, 2.0)])
     points = {"p": (up, down), "m": (down, up)}

@@ -8,8 +8,8 @@ import filippov as fl
 import numpy as np
 import pytest
 from filippov.cycles.branch import Branch, Special
-from filippov.cycles.continuation import continuation
-from filippov.cycles.equilibrium import equilibrium
+from filippov.cycles.following import continuation
+from filippov.cycles.rest import equilibrium
 from statements import cases, system_of
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -7,8 +7,8 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
-from filippov.cycles.equilibrium import equilibrium
 from filippov.cycles.portrait import Portrait, phase_portrait
+from filippov.cycles.rest import equilibrium
 from statements import cases, system_of
 
 ALPHA = 0.41
@@ -95,7 +95,7 @@ def test_surfaces_that_meet_have_an_equilibrium_there() -> None:
 
 
 def test_a_field_without_equilibria_has_none() -> None:
-    """The sliding field is 1 along the surface: least squares would stop beside it."""
+    """The sliding field is 1 along the surface: least squares come to rest where it is not zero."""
     system = fl.System(lambda t, x: [1.0, -np.sign(x[1]) / (1.0 + abs(x[1]))], n=2)
     assert phase_portrait(system, [(-1, 1), (-1, 1.1)], starts=0, density=4).equilibria == []
     with pytest.raises(fl.ModelError, match="no equilibrium in mode 0"):
@@ -147,7 +147,13 @@ class TestPicture:
     def test_in_one_call_with_a_cycle(self) -> None:
         system = harvest(0.5, "harvest_cycle")
         cycle = fl.limit_cycle(system, [0.3, 0.5])
-        ax = fl.plot.portrait(system, [(0, 1), (0.1, 0.8)], cycles=[cycle], starts=[[0.9, 0.2]], density=6)
+        curves = fl.manifold(fl.equilibrium(system, [1.0, 0.0], mode="-"), length=1.0)
+        more = {"cycles": [cycle], "manifolds": curves}
+        ax = fl.plot.portrait(system, [(0, 1), (0.1, 0.8)], starts=[[0.9, 0.2]], density=6, **more)
+        drawn = [line for line in ax.lines if line.get_label() == "manifold"]
+        np.testing.assert_array_equal(
+            [line.get_xdata()[-1] for line in drawn], [c.points[0, -1] for c in curves]
+        )
         lines = [line for line in ax.lines if line.get_label() == "cycle"]
         closed = np.concatenate([line.get_xydata() for line in lines])
         np.testing.assert_allclose(closed[0], closed[-1], atol=1e-8)
@@ -156,7 +162,9 @@ class TestPicture:
         assert ax.get_xlim() == (0.0, 1.0)
         named = [text.get_text() for text in ax.get_legend().get_texts()]
         assert len(named) == len(set(named))
-        assert {"cycle", "trajectory", "visible tangency", "x[1] - alpha = 0: crossed"} <= set(named)
+        assert {"cycle", "manifold", "trajectory", "visible tangency", "x[1] - alpha = 0: crossed"} <= set(
+            named
+        )
 
 
 @pytest.mark.parametrize(
@@ -177,3 +185,15 @@ def test_mistakes_are_named(arguments: tuple[Any, ...], message: str) -> None:
     pytest.importorskip("matplotlib")
     with pytest.raises(ValueError, match="box: the window is needed"):
         fl.plot.portrait(harvest(ALPHA))
+
+
+def test_a_field_that_is_not_finite_in_a_part_of_the_window() -> None:
+    def fun(t: Any, x: Any) -> list[Any]:
+        return [-np.sqrt(x[0]) + 0.5 * (x[1] > 0), -x[1] + np.sign(x[0] - 0.3)]
+
+    found = phase_portrait(fl.System(fun, n=2), [(-1, 1), (-1.1, 1)], starts=2, density=5)
+    assert found.streamlines
+    assert all((line.points[0] >= 0.0).all() for line in found.streamlines)
+    (first, *_) = (parts for parts in found.surfaces if parts.name == "x[1]")
+    kinds = np.concatenate(first.kinds)[np.concatenate(first.sheets, axis=1)[0] < -0.1]
+    assert set(kinds.tolist()) == {"inactive"}

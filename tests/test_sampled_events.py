@@ -1,4 +1,4 @@
-"""Events with a relay of their own, and sections with a floor, are said to be sampled."""
+"""Events with a relay or a table of what may bend or end, and sections with a floor, are sampled."""
 
 from __future__ import annotations
 
@@ -16,8 +16,15 @@ def oscillator(t: float, x: Any) -> Any:
     return [x[1], -x[0]]
 
 
-def test_an_event_with_a_relay_of_its_own_is_said_to_be_sampled() -> None:
-    event = lambda t, x: fl.hysteresis(x[0], -0.3, 0.3) - 0.5  # noqa: E731
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda t, x: fl.hysteresis(abs(x[0]), 0.3, 0.5) - 0.5,
+        lambda t, x: np.interp(np.sqrt(x[0] + 3), [1.0, 1.5, 2.0], [-1.0, 1.0, -1.0]),
+    ],
+    ids=["relay of a kink", "table of a root"],
+)
+def test_an_event_that_cannot_be_followed_is_said_to_be_sampled(event: Callable[..., Any]) -> None:
     for _ in range(2):
         with pytest.warns(fl.FilippovWarning, match=r"events: entry 0 \(.*\) is sampled") as caught:
             fl.solve_ivp(oscillator, (0, 3), [1.0, 0.0], events=event)

@@ -175,3 +175,31 @@ def test_where_second_derivatives_end_is_named() -> None:
         sol = fl.System(two, n=3).solve((0, 3), [0.3, 0.2, 1.0], wrt="y0", order=2)
     assert np.isfinite(sol.derivative()).all()
     assert np.isnan(sol.derivative(order=2)).all()
+
+
+def test_clocks_whose_periods_are_parameters() -> None:
+    def fun(t: float, x: Any, p: float, c: float) -> list[Any]:
+        spring = np.where(np.mod(t, p) < 0.4 * p, 1.0, 2.0)
+        return [x[1], -x[0] * spring - c * np.sign(x[1]) + 0.1 * np.floor(t / p + c) * x[1]]
+
+    check(fl.System(fun, n=2, params={"p": 0.37, "c": 0.13}), (0, 2), [1.0, 0.3])
+
+
+def test_second_derivatives_of_times() -> None:
+    """Of a crossing against differences and a closed form, and of ticks at k p^2."""
+    system = fl.System(lambda t, x, a, c: [-a * x[0] + np.sign(x[0] - c)], n=1, params={"a": 2.0, "c": 0.8})
+    sol = system.solve((0, 0.4), [1.0], wrt=["y0", "a", "c"], order=2, **TIGHT)
+    # Above, x' = 1 - a x: t = log((a - 1) / (a c - 1)) / a for x(0) = 1.
+    second = sol.switches[0].derivative.second_dt
+    for column, name in ((1, "a"), (2, "c")):
+        above, below = (
+            system.solve((0, 0.4), [1.0], {name: value}, wrt=["y0", "a", "c"], **TIGHT).switches.dt[0]
+            for value in (system.params[name] + 1e-5, system.params[name] - 1e-5)
+        )
+        np.testing.assert_allclose(second[column], (above - below) / 2e-5, rtol=1e-7, atol=1e-7)
+    # By c alone t = log((a - 1) / (a c - 1)) / a has t'' = a / (a c - 1)^2.
+    assert second[2, 2] == pytest.approx(2.0 / 0.36, rel=1e-10)
+
+    ticks = fl.System(lambda t, x, p: [np.floor(t / p**2)], n=1, params={"p": 0.5})
+    sol = ticks.solve((0, 0.8), [0.0], wrt=["p"], order=2, **TIGHT)
+    assert [float(one.derivative.second_dt[0, 0]) for one in sol.switches] == pytest.approx([2, 4, 6])

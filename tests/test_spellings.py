@@ -228,6 +228,32 @@ def test_a_buffer_that_outlives_the_call_is_refused_by_name() -> None:
         fl.solve_ivp(fun, (0, 1), [1.0, 0.0])
 
 
+@pytest.mark.parametrize(
+    "fun",
+    [
+        lambda t, x: [{0: 1.0, 1: 2.0, 2: 0.5}[int(t)]],
+        lambda t, x: [1.0 if int(t) in {0, 2} else 0.5],
+    ],
+    ids=["dict", "set"],
+)
+def test_a_traced_key_is_refused_and_the_way_out_works(fun: Callable[..., Any]) -> None:
+    with pytest.raises(
+        fl.TraceError, match=r"key of a dict, or as an entry of a set(.|\n)*`values\[int\(t\)\]`"
+    ):
+        fl.solve_ivp(fun, (0, 3), [0.0])
+    values = [fun(k, None)[0] for k in range(3)]
+    sol = fl.solve_ivp(lambda t, x: [values[int(t)]], (0, 2.5), [0.0])
+    assert sol.y[0, -1] == pytest.approx(values[0] + values[1] + 0.5 * values[2], abs=1e-9)
+
+
+def test_a_list_written_out_in_the_function_is_refused_and_both_ways_out_work() -> None:
+    with pytest.raises(fl.TraceError, match=r"np\.array\(\[\.\.\.\]\)\[k\], or make the list outside"):
+        fl.solve_ivp(lambda t, x: [[1.0, 2.0][int(t)]], (0, 2), [0.0])
+    values = [1.0, 2.0]
+    for fun in (lambda t, x: [np.array([1.0, 2.0])[int(t)]], lambda t, x: [values[int(t)]]):
+        assert fl.solve_ivp(fun, (0, 1.5), [0.0]).y[0, -1] == pytest.approx(2.0, abs=1e-9)
+
+
 def test_a_function_that_assigns_a_global_is_not_copied() -> None:
     def fun(t: Any, x: Any) -> Any:
         global CALLS
@@ -289,6 +315,30 @@ def test_derivatives_of_a_solve(method: str) -> None:
     plain = lambda t, x: np.linalg.solve(A(x), [x[0], x[1], 1.0, x[0] * x[1]])[:2]  # noqa: E731
     exact = integrate.solve_ivp(plain, (0, 1), [0.4, 0.2], method="DOP853", rtol=1e-13, atol=1e-14)
     np.testing.assert_allclose(sol.y[:, -1], exact.y[:, -1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["Rodas5P", "Taylor", "DOP853"])
+def test_derivatives_by_the_start_through_a_solve(method: str) -> None:
+    """Against the variational equation with the derivative of the inverse by hand."""
+    A = lambda x: np.array([[2 + x[0] ** 2, x[1], 0], [x[1], 3, x[0]], [0, x[0], 4]])  # noqa: E731
+    by = [
+        lambda x: np.array([[2 * x[0], 0, 0], [0, 0, 1], [0, 1, 0]]),
+        lambda x: np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]),
+    ]
+    right = lambda x: np.array([x[0], x[1], x[0] * x[1]])  # noqa: E731
+    by_right = [lambda x: np.array([1.0, 0.0, x[1]]), lambda x: np.array([0.0, 1.0, x[0]])]
+
+    def with_variations(t: float, z: Any) -> Any:
+        x, S = z[:2], z[2:].reshape(2, 2)
+        rate = np.linalg.solve(A(x), right(x))
+        columns = [np.linalg.solve(A(x), by_right[j](x) - by[j](x) @ rate)[:2] for j in range(2)]
+        return np.concatenate([rate[:2], (np.stack(columns, axis=1) @ S).ravel()])
+
+    z0 = [0.4, 0.2, 1.0, 0.0, 0.0, 1.0]
+    exact = integrate.solve_ivp(with_variations, (0, 1), z0, method="DOP853", rtol=1e-13, atol=1e-15)
+    fun = lambda t, x: np.linalg.solve(A(x), right(x))[:2]  # noqa: E731
+    sol = fl.solve_ivp(fun, (0, 1), [0.4, 0.2], wrt="y0", method=method, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(sol.derivative(), exact.y[2:, -1].reshape(2, 2), rtol=0, atol=1e-12)
 
 
 def test_a_sparse_heat_equation_is_that_of_slices() -> None:

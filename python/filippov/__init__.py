@@ -61,6 +61,8 @@ if TYPE_CHECKING:
         limit_cycle,
         manifold,
     )
+    from filippov.cycles.box import equilibria
+    from filippov.cycles.exponents import lyapunov
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
@@ -105,12 +107,14 @@ __all__ = [
     "bifurcation_diagram",
     "continuation",
     "cycles",
+    "equilibria",
     "equilibrium",
     "gradient",
     "hidden_dynamics",
     "hysteresis",
     "limit_cycle",
     "load",
+    "lyapunov",
     "manifold",
     "open_sweep",
     "plot",
@@ -134,6 +138,8 @@ _LAZY_NAMES = {
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
     **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
     **dict.fromkeys(("continuation", "equilibrium", "limit_cycle", "manifold"), "cycles"),
+    "equilibria": "cycles.box",
+    "lyapunov": "cycles.exponents",
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

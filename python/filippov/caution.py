@@ -14,11 +14,11 @@ __all__ = ["warn_user"]
 
 def warn_user(texts: Iterable[str]) -> None:
     """Issue a `FilippovWarning` for each text, at the innermost line outside of this package and NumPy."""
-    different = dict.fromkeys(texts)
-    if not different:
+    found = dict.fromkeys(texts)
+    if not found:
         return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and is_foreign(frame.f_code.co_filename):
         frame, level = frame.f_back, level + 1
-    for text in different:
+    for text in found:
         warnings.warn(text, FilippovWarning, stacklevel=level)

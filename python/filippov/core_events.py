@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +12,11 @@ from filippov._core import TracedEvent, TracedSystem
 from filippov.caution import warn_user
 from filippov.events import EventSpec, bind_function, check_scalar_function, selective
 from filippov.prepare import Prepared
-from filippov.trace import trace_event
+from filippov.trace import OWN_LAW, trace_event
 from filippov.trace.fingerprint import fingerprint
+
+if TYPE_CHECKING:
+    from filippov.system import System
 
 __all__ = ["CoreEvent", "core_events", "sampled"]
 
@@ -23,33 +26,48 @@ CoreEvent = tuple[Callable[[float, Array], float] | TracedEvent, float, int, str
 
 def core_events(
     specs: list[EventSpec],
+    system: System | None,
     prepared: Prepared,
     t0: float,
     y0: Array,
     args: tuple[Any, ...],
     values: dict[str, float],
-) -> list[CoreEvent]:
-    """Turn events into nodes of the traced system where possible, else keep them as functions."""
-    events: list[CoreEvent] = []
-    for index, spec in enumerate(specs):
-        g = bind_function(spec.g, args, values)
+) -> tuple[Prepared, list[CoreEvent]]:
+    """Turn events into nodes of the traced system where possible, else keep them as functions.
+
+    Without a `system`, while time runs backward, events with tables and relays of their own are called.
+
+    Returns
+    -------
+    Prepared, list of CoreEvent
+        The system of the run: with the tables and relays of the events, if they have some of their own.
+    """
+    functions = [bind_function(spec.g, args, values) for spec in specs]
+    for index, (spec, g) in enumerate(zip(specs, functions, strict=True)):
         check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-        traced = _traced(prepared, spec, t0, y0, args, values)
+    found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
+    with_own_laws = [spec.g for spec, traced in zip(specs, found, strict=True) if traced == OWN_LAW]
+    if with_own_laws and system is not None:
+        extended = system.prepare_with_laws_of(with_own_laws, prepared, t0, y0, values)
+        if extended is not None and extended.trace is not None:
+            prepared = extended
+            found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
+    events: list[CoreEvent] = []
+    for index, (spec, g, traced) in enumerate(zip(specs, functions, found, strict=True)):
         if isinstance(traced, TracedEvent):
             events.append((traced, spec.direction, spec.terminal, spec.name))
             continue
         if traced:
             warn_user([sampled(f"events: entry {index} ({spec.name})", traced)])
         events.append((g, spec.direction, spec.terminal, spec.name))
-    return events
+    return prepared, events
 
 
 def sampled(what: str, kink: str) -> str:
     """Return the warning for a function that has no bounds because of a kink."""
     return (
         f"{what} is sampled: it has {kink}. Its zeros are located, but two of them that are close together "
-        "within a step may both be missed; a small max_step makes it less likely. A floor or relay that the "
-        "right-hand side has, too, is followed"
+        "within a step may both be missed; a small max_step makes it less likely"
     )
 
 

@@ -65,8 +65,8 @@ def check_wrt(
     Parameters
     ----------
     wrt : str, sequence of str, or Back
-        ``"y0"`` (all initial states), ``"t0"``, names of parameters, ``"params"`` (all of them), ``"all"``
-        (both).
+        ``"y0"`` (all initial states), ``"t0"``, names of parameters and of discrete states (by their values
+        at the start), ``"params"`` (all parameters), ``"all"`` (initial states and parameters).
     states : sequence of str
         Names of the states.
     params : collection of str
@@ -92,6 +92,7 @@ def check_wrt(
             f"not {wrt!r}"
         )
     places = {name: place for place, name in enumerate(params) if name not in discrete}
+    held = [name for name in params if name in discrete]
     found: dict[str, tuple[int, int]] = {}
     asked: dict[str, int] = {}
     for name in names:
@@ -101,13 +102,17 @@ def check_wrt(
             own = list(places)
         elif name in places:
             own = [name]
+        elif name in held:
+            # Discrete states are states behind those of the system.
+            own = []
+            found[name] = (_STATE, len(states) + held.index(name))
         else:
             own = []
             if name == "t0":
                 found["t0"] = (_START, 0)
             elif name != "y0":
-                known = ", ".join(map(repr, places)) if places else "none"
-                hint = did_you_mean(name, ["y0", "t0", "params", "all", *places])
+                known = ", ".join(map(repr, (*places, *held))) if places or held else "none"
+                hint = did_you_mean(name, ["y0", "t0", "params", "all", *places, *held])
                 raise InputError(
                     f'wrt: {name!r} is none of "y0", "t0", "params" and "all", and no parameter{hint}; '
                     f"parameters: {known}"
@@ -124,15 +129,13 @@ def check_wrt(
     return Wanted(tuple(found), list(found.values()), [places[name] for name in asked], int(order))
 
 
-def refuse_without_derivatives(
-    prepared: Prepared, discrete: Collection[str], t_span: tuple[float, float]
-) -> None:
+def refuse_without_derivatives(prepared: Prepared, t_span: tuple[float, float]) -> None:
     """Refuse derivatives of what has none.
 
     Raises
     ------
     InputError
-        For a black box, a reset whose map is not traced, named discrete states, and time that runs backward.
+        For a black box, a reset whose map is not traced, and time that runs backward.
     """
     if not isinstance(prepared.core, TracedSystem):
         raise InputError(
@@ -143,7 +146,5 @@ def refuse_without_derivatives(
             raise InputError(
                 f"wrt: the map of the reset {action.name!r} is not traced: its derivative is not known"
             )
-    if discrete:
-        raise InputError(f"wrt: no derivatives pass through discrete states, here {', '.join(discrete)}")
     if t_span[1] < t_span[0]:
         raise InputError(FORWARD_ONLY)

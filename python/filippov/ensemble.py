@@ -191,7 +191,8 @@ class Ensemble(Sequence[Solution]):
             raise ModelError(NO_DERIVATIVES)
         if side not in ("right", "left"):
             raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
-        shape = len(self), len(self._states), len(self.wrt)
+        rows = len(self._states) + len(self._system.discrete)
+        shape = len(self), rows, len(self.wrt)
         if t is None:
             return np.reshape([member.derivative() for member in self], shape)
         if not self._dense_output:
@@ -246,7 +247,7 @@ def run_ensemble(
     for group in groups:
         fit_kappa(checked.sliding, group.prepared.surfaces)
         if wanted is not None:
-            refuse_without_derivatives(group.prepared, system.discrete, (t0, t1))
+            refuse_without_derivatives(group.prepared, (t0, t1))
     runs: list[Run] = []
     raised: BaseException | None = None
     for group in groups:
@@ -319,7 +320,7 @@ def _groups(
     while start < count:
         values = dict(zip(names, table[start].tolist(), strict=True))
         prepared = system.prepare(states.shape[1], t0, states[start].copy(), values)
-        events = core_events(specs, prepared, t0, states[start], (), values)
+        prepared, events = core_events(specs, system, prepared, t0, states[start], (), values)
         if start == 0 and system.outputs:
             refuse_outputs_that_fail(system, prepared, t0, states[start].copy(), values)
         stop = count

@@ -50,6 +50,8 @@ class Source(NamedTuple):
         Parameters that resets may set: their values are those at the start.
     root_ends : bool
         Whether roots in the field end where their argument vanishes, and are zero beyond.
+    beside : tuple of callable
+        Events of a run that read tables or relays of their own.
     """
 
     fun: Callable[..., Any]
@@ -61,6 +63,7 @@ class Source(NamedTuple):
     resets: tuple[Reset, ...] = ()
     discrete: tuple[str, ...] = ()
     root_ends: bool = False
+    beside: tuple[Callable[..., Any], ...] = ()
 
     def named_functions(self) -> list[tuple[str, Any]]:
         """Return the functions with what they are called in messages; `fun` may call others of them."""

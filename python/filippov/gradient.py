@@ -27,6 +27,7 @@ from filippov.forms import Source
 from filippov.options import check_t_span, check_y0
 from filippov.resets import Reset
 from filippov.solution import Solution
+from filippov.switches import Borders, borders_of
 from filippov.system import System
 from filippov.trace.tracer import trace_output
 from filippov.unknown import did_you_mean
@@ -69,8 +70,8 @@ def gradient(
     params : dict, optional
         Values of parameters; the others have their defaults.
     terminal, running : callable, optional
-        ``cost(t, y, **params) -> float``; each takes the parameters that it names. What they branch or jump
-        on is located as in the system.
+        ``cost(t, y, **params) -> float``; each takes the parameters and discrete states that it names. What
+        they branch or jump on is located as in the system.
     instants : sequence of (when, callable), optional
         ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a
         function ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about).
@@ -151,12 +152,11 @@ def gradient(
         else:
             for t in part.times:
                 total.add(part.name, part.cost, float(t))
-    found, lost, starts_on = total.gradient()
+    found, lost, borders = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
-    if starts_on:
-        names = ", ".join(sol.surfaces[j] for j in starts_on if j < len(sol.surfaces))
-        warn_user([f"the run starts on {names} = 0: the gradient by the start is that of one side"])
+    for border in borders_of(borders, sol.status == 0, sol.surfaces):
+        warn_user([f"the run {border.what}: the gradient {border.whose} is that of one side"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
     return total.value, {name: entry for name, entry in entries if name != _RUNNING}
 
@@ -193,9 +193,6 @@ def _checked(
     """Return the events and the costs at instants; refuse what is none."""
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
-    if system.discrete:
-        names = ", ".join(system.discrete)
-        raise InputError(f"system: no derivatives pass through discrete states, here {names}")
     refused = [name for name in _REFUSED if name in options]
     if refused:
         raise InputError(f"{refused[0]}: it is not an option of a gradient")
@@ -255,21 +252,26 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
     def before(function: Cost) -> Cost:
         return lambda t, x, *args, **params: function(t, x[:n], *args, **_named(function, params))
 
-    def reset_of(reset: Reset) -> Reset:
+    def after(map_: Cost) -> Cost:
         def change(t: Any, x: Any, *args: Any, **params: Any) -> list[Any]:
-            assert reset.map is not None
-            after = reset.map(t, x[:n], *args, **_named(reset.map, params))
-            return [*np.ravel(np.asarray(after, dtype=object)), x[n]]
+            moved = map_(t, x[:n], *args, **_named(map_, params))
+            return [*np.ravel(np.asarray(moved, dtype=object)), x[n]]
 
+        return change
+
+    def reset_of(reset: Reset) -> Reset:
         new = copy(reset)
-        new.map = change
+        new.map = None if reset.map is None else after(reset.map)
         new.h = None if reset.h is None else before(reset.h)
+        new.set = {name: before(value) if callable(value) else value for name, value in reset.set.items()}
         return new
 
     resets = tuple(reset_of(reset) for reset in source.resets)
     surfaces = tuple(before(surface) for surface in source.surfaces)
     extended = System._from_source(
-        Source(fun, surfaces, source.args, black_box=source.black_box, resets=resets),
+        Source(
+            fun, surfaces, source.args, black_box=source.black_box, resets=resets, discrete=source.discrete
+        ),
         n + 1,
         system.params,
         (*system.state_names(n), _RUNNING),
@@ -299,7 +301,8 @@ class _Sum:
 
     def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
         """Add a function at the end of the run, which is at a zero of another function if this is given."""
-        self.value += float(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, self._values)))
+        values = self._values_at(self._sol.t[-1], False)
+        self.value += float(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, values)))
         known = None if zero is None else self._trace(name, zero)
         self._terms.append((self._trace(name, cost), None, None, known))
 
@@ -315,8 +318,8 @@ class _Sum:
                 self._add_value(cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
 
-    def gradient(self) -> tuple[Array, tuple[float, str] | None, list[int]]:
-        """Return the gradient by the columns, where and why there is none, and surfaces it starts on."""
+    def gradient(self) -> tuple[Array, tuple[float, str] | None, Borders]:
+        """Return the gradient by the columns, where and why there is none, and where it has sides."""
         run = self._sol._run
         assert isinstance(run, Run)
         return run.cost_gradient(self._terms)
@@ -324,7 +327,14 @@ class _Sum:
     def _add_value(self, cost: Cost, t: float) -> None:
         assert self._sol.sol is not None
         y = self._sol.sol(t, side="left")
-        self.value += float(cost(t, y, **_named(cost, self._values)))
+        self.value += float(cost(t, y, **_named(cost, self._values_at(t, True))))
+
+    def _values_at(self, t: float, is_left: bool) -> dict[str, float]:
+        """Return the values of the parameters, and of the discrete states at a time."""
+        names, run = tuple(self._sol.discrete), self._sol._run
+        assert isinstance(run, Run)
+        held = run.discrete(np.array([t]), len(names), is_left)[:, 0] if names else ()
+        return {**self._values, **dict(zip(names, np.asarray(held).tolist(), strict=True))}
 
     def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
         """Return a function as an expression. At a known time what it reads of the time is a number."""

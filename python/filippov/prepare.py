@@ -212,7 +212,7 @@ def _key(
     if source.signed is not None:  # built once for a System, around functions of this package
         return None
     resets = [reset.parts() for reset in source.resets]
-    read = fingerprint(source.fun, source.args, source.surfaces, resets)
+    read = fingerprint(source.fun, source.args, source.surfaces, resets, source.beside)
     if read is None:
         return None
     return n, tuple(values), source.discrete, source.root_ends, states and tuple(states), read
@@ -243,6 +243,7 @@ def _trace(
         states=states,
         discrete=source.discrete,
         root_ends=source.root_ends,
+        beside=[selective(g, values) for g in source.beside],
     )
 
 
@@ -266,7 +267,8 @@ def _actions(
         if reset.map is not None:
             own = bind_function(reset.map, source.args, values)
             _check_map(own, n, t0, y0, f"resets: entry {k} ({reset.name})")
-        _check_set(reset, bound(t0, start.copy())[n:] if discrete else (), discrete, f"resets: entry {k}")
+        if discrete:
+            _check_set(reset, bound, t0, start, discrete, f"resets: entry {k}")
         try:
             traced = trace(
                 selective(change, values),
@@ -333,8 +335,16 @@ def _check_map(bound: Callable[..., Any], n: int, t0: float, y0: Array, what: st
     check_map_value(value, n, what)
 
 
-def _check_set(reset: Reset, values: Sequence[Any], discrete: Sequence[str], what: str) -> None:
-    """Refuse a reset that sets a discrete state to something else than a number."""
+def _check_set(
+    reset: Reset, bound: Callable[..., Any], t0: float, start: Array, discrete: Sequence[str], what: str
+) -> None:
+    """Refuse a reset that raises, or sets a discrete state to something else than a number."""
+    try:
+        values = bound(t0, start.copy())[len(start) - len(discrete) :]
+    except Exception as error:
+        raise InputError(
+            f"{what} ({reset.name}) raised {type(error).__name__} at the start: {error}"
+        ) from error
     for name, value in zip(discrete, values, strict=False):
         try:
             real(value)

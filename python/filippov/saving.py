@@ -183,10 +183,15 @@ class Saving(ABC):
     def _restore(
         self, data: bytes, functions: Sequence[Callable[..., Any]], remembers: Sequence[str] = ()
     ) -> None:
-        self._prepared, self._states, self._params = unpacked(data, functions, remembers)
-        self._n = self._prepared.core.n_states
+        self._restore_from(*unpacked(data, functions, remembers))
+
+    def _restore_from(
+        self, prepared: Prepared, states: tuple[str, ...] | None, params: dict[str, float]
+    ) -> None:
+        self._prepared, self._states, self._params = prepared, states, params
+        self._n = prepared.core.n_states
         self._source, self._calls, self._outputs = None, {}, {}
-        core = self._prepared.core
+        core = prepared.core
         self._discrete = tuple(core.discrete()) if isinstance(core, TracedSystem) else ()
 
     def __getstate__(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from filippov.arrays import finite_array
 from filippov.classification import classify
-from filippov.errors import InputError
+from filippov.errors import InputError, ModelError
 from filippov.implicit import zero_curves, zero_triangles
 from filippov.kinds import part_curve, part_triangles
 from filippov.options import check_time
@@ -45,7 +45,7 @@ class SurfaceParts:
         is one, the corners of `triangles`.
     kinds : list of ndarray of str, shape (k,)
         For every point ``attracting``, ``repelling``, ``crossing``, ``tangency``, ``intersection``, or
-        ``inactive`` (the field does not switch there).
+        ``inactive`` (the field does not switch there, or is not finite).
     triangles : ndarray of int, shape (n_triangles, 3)
         Corners of triangles that make up the surface in space; none in the plane.
     """
@@ -180,7 +180,10 @@ def _surface_value(prepared: Prepared, t: float, x: Array, p: Array, surface: in
 
 def _kind(prepared: Prepared, t: float, x: Array, p: Array, surface: int) -> str:
     reach = _NEAR * (1.0 + float(np.abs(x).max()))
-    found = classify(prepared, t, x, p, reach, ())
+    try:
+        found = classify(prepared, t, x, p, reach, ())
+    except ModelError:
+        return "inactive"  # a field is not finite
     if len(found.surfaces) > 1:
         return "intersection"
     if surface not in found.surfaces:

@@ -30,6 +30,7 @@ from filippov.switches import (
     derivative_warnings,
     import_pandas,
     import_xarray,
+    symmetric,
 )
 from filippov.trace.tracer import trace_output
 
@@ -433,8 +434,8 @@ class Solution:
         Returns
         -------
         ndarray, shape (n, len(wrt)) or (n, len(wrt), k); for order 2 (n, len(wrt), len(wrt)) or with k behind
-            NaN from an instant on at which there is no derivative; ``sol.switches[i].derivative.lost`` says
-            why.
+            Discrete states with names have rows behind those of the n states. NaN from an instant on at which
+            there is no derivative; ``sol.switches[i].derivative.lost`` says why.
 
         Raises
         ------
@@ -469,7 +470,7 @@ class Solution:
             raise ModelError("no second derivatives were followed: solve with order=2")
         if t is None:
             if order == 2:
-                return self._as_forms(self._run.second_derivatives(None, False)[0])
+                return symmetric(self._run.second_derivatives(None, False)[0], len(self.wrt))
             at_end = self._run.derivatives_at_end()
             assert at_end is not None
             return at_end
@@ -478,19 +479,12 @@ class Solution:
         self._kept_function()._check_range(flat)
         left = side == "left"
         if order == 2:
-            forms = [self._as_forms(pairs) for pairs in self._run.second_derivatives(flat, left)]
+            pairs = self._run.second_derivatives(flat, left)
+            forms = [symmetric(at_one, len(self.wrt)) for at_one in pairs]
             found = np.stack(forms, axis=-1)
         else:
             found = np.stack(self._run.derivatives(flat, left), axis=-1)
         return found if times.ndim else found[..., 0]
-
-    def _as_forms(self, pairs: Array) -> Array:
-        """Return symmetric matrices from the entries (a, b) with b <= a in order, for every state."""
-        k = len(self.wrt)
-        forms = np.empty((len(pairs), k, k))
-        rows, columns = np.tril_indices(k)
-        forms[:, rows, columns] = forms[:, columns, rows] = pairs
-        return forms
 
     @cached_property
     def segments(self) -> SegmentTable:
@@ -796,7 +790,7 @@ class Solution:
                 raise ModelError(
                     f"to_xarray: {', '.join(sorted(taken))} is a name of the table of derivatives"
                 )
-            variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t))
+            variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t)[: len(self.states)])
             coords.update(state=as_texts(self.states), wrt=as_texts(self.wrt))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords=coords, attrs=attributes)

@@ -273,7 +273,7 @@ def solve_prepared(
 def solve_quietly(
     system: System, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float], options: Mapping[str, Any]
 ) -> Solution:
-    """Solve as `solve_ivp` does, for an analysis, which shows no warnings of its runs: they are in `warnings`."""
+    """Solve as `solve_ivp` does, and show no warnings; for the runs of an analysis."""
     others = dict(options)
     events = others.pop("events", None)
     return _solve(system, t_span, y0, _changed(others), events, None, params, None, None)
@@ -363,18 +363,19 @@ def _solve(
     wanted = None
     if wrt is not None:
         wanted = check_wrt(wrt, states, values, system.discrete, order)
-        refuse_without_derivatives(prepared, system.discrete, (t0, t1))
+        refuse_without_derivatives(prepared, (t0, t1))
 
-    def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> AnyRun:
-        found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
-        return _run(prepared, t0, t1, state, values, options, found, choices, wanted)
+    def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> tuple[AnyRun, Prepared]:
+        start, forward = (t0, system) if t1 >= t0 else (-t0, None)
+        used, found = core_events(specs or [], forward, prepared, start, state, constants, values)
+        return _run(used, t0, t1, state, values, options, found, choices, wanted), used
 
     def follow(choices: tuple[Mode, ...]) -> Solution:
-        run, used = run_of(prepared, choices), prepared
+        run, used = run_of(prepared, choices)
         if run.reason == "field_not_finite" and t0 < t1:
             ended = system.prepare_with_ends_of_roots(prepared, n, t0, state, values)
             if ended is not None:
-                beyond = run_of(ended, choices)
+                beyond, ended = run_of(ended, choices)
                 if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
                     run, used = beyond, ended
         has_events = specs is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,9 @@ class InstantDerivative(NamedTuple):
     square_root : ndarray, shape (n,), or None
         At an impact without speed: the state behind differs from the undisturbed motion by this times the
         square root of the depth that the undisturbed motion would reach.
+    second_dt : ndarray, shape (k, k), or None
+        With ``order=2`` the second derivatives of the time, where they are known; NaN where the motion leaves
+        a surface at an end of its multiplier.
     """
 
     t: float
@@ -74,13 +77,23 @@ class InstantDerivative(NamedTuple):
     lost: str
     sides: tuple[OneSided, ...] = ()
     square_root: Array | None = None
+    second_dt: Array | None = None
 
     @classmethod
     def from_row(cls, row: tuple[Any, ...]) -> InstantDerivative:
         """Return what a row of the core says."""
-        t, dt, saltation, params, condition, lost, sides, square_root = row
+        t, dt, saltation, params, condition, lost, sides, square_root, pairs = row
         by_side = (OneSided(tuple(order), states, own) for order, states, own in sides)
-        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root)
+        second_dt = None if pairs is None else symmetric(pairs[np.newaxis], len(dt))[0]
+        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root, second_dt)
+
+
+def symmetric(pairs: Array, k: int) -> Array:
+    """Return symmetric k x k matrices from the entries (a, b) with b <= a in order, for every row."""
+    forms = np.empty((len(pairs), k, k))
+    rows, columns = np.tril_indices(k)
+    forms[:, rows, columns] = forms[:, columns, rows] = pairs
+    return forms
 
 
 class Switch(NamedTuple):
@@ -537,13 +550,42 @@ _WHY_LOST = {
 }
 
 
+# The surfaces on which a run starts; whether an action, or a tick, is at its start, and a switch at its end.
+Borders: TypeAlias = "tuple[list[int], bool, bool, bool]"
+
+
+class Border(NamedTuple):
+    """What the start or the end of a run coincides with, so that derivatives are those of one side."""
+
+    what: str
+    whose: str
+    surfaces: tuple[str, ...] = ()
+    is_end: bool = False
+
+
+def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -> list[Border]:
+    """Return where the derivatives of a run are those of one side, from what the core found."""
+    starts_on, starts_at_action, starts_at_tick, ends_at_instant = found
+    borders = []
+    left = tuple(names[j] for j in starts_on if j < len(names))
+    if left:
+        borders.append(Border(f"starts on {', '.join(left)} = 0", "by the start", left))
+    if starts_at_action:
+        borders.append(Border("starts at the very time of an action", "by the initial time"))
+    if starts_at_tick:
+        borders.append(Border("starts at the very time of a tick", "by the start"))
+    if ends_at_instant and ends_at_given_time:
+        what = "ends at the very time of a switch, which a changed run has earlier or later"
+        borders.append(Border(what, "at its end", is_end=True))
+    return borders
+
+
 def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWarning]:
     """Return what a run with ``wrt=`` met that its derivatives do not pass, or have on one side only."""
     found = []
-    left = tuple(names[j] for j in run.starts_on() if j < len(names))
-    if left:
-        text = f"the run starts on {', '.join(left)} = 0: derivatives by the start are those of one side"
-        found.append(RunWarning(t0, "one_sided", text, (), left))
+    for border in borders_of(run.borders(), run.status == 0, names):
+        text = f"the run {border.what}: derivatives {border.whose} are those of one side"
+        found.append(RunWarning(run.t_last if border.is_end else t0, "one_sided", text, (), border.surfaces))
     lost = run.derivatives_lost()
     if lost is not None:
         t, why = lost

@@ -23,6 +23,7 @@ from filippov.points import Points
 from filippov.prepare import Prepared, check_n, numbered_states, prepare
 from filippov.resets import check_resets, refuse_undeclared
 from filippov.saving import Saving
+from filippov.scalars import positive
 from filippov.solution import Solution
 from filippov.trace.explain import deepest_user_line
 from filippov.unknown import did_you_mean
@@ -388,6 +389,75 @@ class System(Points, Saving):
 
         return run_ensemble(self, t_span, y0, params, events, threads, options)
 
+    def regularize(self, eps: float, kind: str = "tanh", kappa: npt.ArrayLike | None = None) -> System:
+        """Return the regularised system: a smooth function of ``u = kappa h / eps`` for the sign of every h.
+
+        Parameters
+        ----------
+        eps : float
+            The width of the layers around the surfaces. It becomes a parameter of the new system, the last
+            one, of the name ``"eps"``.
+        kind : {"tanh", "linear"}, optional
+            The function: ``tanh(u)``, or ``clip(u, -1, 1)``, whose corners are surfaces of the new system.
+        kappa : float or array_like, shape (n_surfaces,), optional
+            Positive factors of the switching functions, in the order of `surfaces`. Default: 1.
+
+        Returns
+        -------
+        System
+            A system with the same states and the same parameters. It has no outputs. Where the function
+            branches on values of parameters, it holds for the default values alone.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the system has a parameter ``"eps"``.
+        ModelError
+            If the system has quantisers, resets, or laws with a memory, which are named; or if the number of
+            its states is not known, or it could not be traced.
+
+        Notes
+        -----
+        Every spelling of a switch means a sign: ``abs(h)`` becomes ``h tanh(u)``, and a choice between two
+        values the one with the weights ``(1 + tanh(u)) / 2`` and ``(1 - tanh(u)) / 2``. Both values are
+        needed on both sides of the surface. Motions that slide are stiff, with rates like 1 / eps: for small
+        `eps` take ``method="Rodas5P"``.
+
+        References
+        ----------
+        Sotomayor and Teixeira, Regularization of discontinuous vector fields, Equadiff 95 (1996) 207-223;
+        Guglielmi and Hairer, SIAM J. Appl. Dyn. Syst. 14 (2015) 1454.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> relay = fl.System(lambda t, x, a=0.5: [a - np.sign(x[0])], n=1)
+        >>> smooth = relay.regularize(1e-2)
+        >>> smooth
+        System(n=1, a=0.5, eps=0.01, surfaces=[])
+        >>> sol = smooth.solve((0, 4), [1.0])
+        >>> bool(abs(sol.y[0, -1] - 1e-2 * np.arctanh(0.5)) < 1e-6)
+        True
+        """
+        from filippov.regularized import regularized
+
+        width = positive("eps", eps)
+        if "eps" in self._params:
+            raise InputError("eps: the system has a parameter of this name; rename it")
+        prepared = self._prepared_now()
+        twin = regularized(prepared, "eps", kind, kappa)
+        params = {**self._params, "eps": width}
+        if prepared.pinned is not None:
+            twin = twin._replace(pinned={**prepared.pinned, "eps": width})
+        return type(self)._of_core(twin, self._states, params)
+
+    @classmethod
+    def _of_core(cls, prepared: Prepared, states: tuple[str, ...] | None, params: dict[str, float]) -> System:
+        """Return a system that is there already in the core."""
+        new = cls.__new__(cls)
+        new._restore_from(prepared, states, params)
+        return new
+
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters, the defaults overridden by `given`.
 
@@ -492,6 +562,21 @@ class System(Points, Saving):
             return None
         ended = prepare(self._source._replace(root_ends=True), n, values, self._states, t0, y0)
         return ended if ended.trace is not None and ended.trace.ends else None
+
+    def prepare_with_laws_of(
+        self,
+        functions: Sequence[Callable[..., Any]],
+        prepared: Prepared,
+        t0: float,
+        y0: Array,
+        values: dict[str, float],
+    ) -> Prepared | None:
+        """Return the system with the tables and relays of events too; None after unpickling."""
+        if self._source is None or prepared.trace is None:
+            return None
+        root_ends = bool(prepared.trace.ends)
+        source = self._source._replace(beside=tuple(functions), root_ends=root_ends)
+        return prepare(source, len(y0), values, self._states, t0, y0)
 
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
         """Return the system with time reversed, ``s = -t``; only for systems without surfaces.

@@ -1,1 +1,1 @@
-"""Random piecewise-smooth systems, and what every solution of them fulfils; `make fuzz`."""
+"""Random piecewise-smooth systems, what every solution fulfils, and its derivatives; `make fuzz`."""

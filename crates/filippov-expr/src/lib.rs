@@ -33,7 +33,7 @@
 //!
 //! The crate knows nothing of time stepping. Modules: [`graph`] (construction, with `simplify`),
 //! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`region`] (what an
-//! expression is under each combination of its signs), [`derivative`],
+//! expression is under each combination of its signs), [`regularized`] (smooth functions for signs), [`derivative`],
 //! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), [`enclosure`]
 //! (rigorous bounds along pieces of motions) and [`jet`] (Taylor coefficients of motions).
 
@@ -61,6 +61,7 @@ mod print;
 pub mod program;
 mod range;
 pub mod region;
+pub mod regularized;
 mod relative_degree;
 pub mod roots;
 mod schedule;

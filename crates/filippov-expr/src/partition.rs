@@ -102,6 +102,24 @@ impl Graph {
         image.get(&root).copied().unwrap_or(root)
     }
 
+    /// An expression of another graph, made again here; `None` if it contains signs.
+    pub fn adopted(&mut self, from: &Graph, root: NodeId) -> Option<NodeId> {
+        if from.has_signs(root) {
+            return None;
+        }
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in from.all_below(&[root]) {
+            let made = match *from.node(id) {
+                Node::Constant(value) => self.constant(value),
+                Node::Unary(op, a) => self.unary(op, image[&a]),
+                Node::Binary(op, a, b) => self.binary(op, image[&a], image[&b]),
+                leaf => self.insert(leaf),
+            };
+            image.insert(id, made);
+        }
+        image.get(&root).copied()
+    }
+
     /// The values with some signs fixed: `Sign(j)` becomes the number, and a select on it the branch taken,
     /// where `signs[j]` is given. Signs beyond the end of `signs` stay free.
     pub fn at_signs(&mut self, roots: &[NodeId], signs: &[Option<f64>]) -> Vec<NodeId> {

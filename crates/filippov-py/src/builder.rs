@@ -215,6 +215,13 @@ impl Builder {
         Ok(graph.substituted(a, &images).0)
     }
 
+    /// An expression of another builder, made again here; none if it contains signs.
+    fn adopted(&self, other: &Builder, a: u32) -> PyResult<Option<u32>> {
+        let from = other.graph().clone();
+        let a = Self::node(&from, a)?;
+        Ok(self.graph().adopted(&from, a).map(|id| id.0))
+    }
+
     /// Those of some expressions that others are made of.
     fn occurring(&self, nodes: Vec<u32>, within: Vec<u32>) -> PyResult<Vec<u32>> {
         let graph = self.graph();

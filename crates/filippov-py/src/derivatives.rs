@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, OneSided,
-    Tangents, Term, Trail, WayBack, When,
+    Borders, Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension,
+    OneSided, Tangents, Term, Trail, WayBack, When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -19,7 +19,7 @@ use crate::systems::{raised, refused};
 pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
 
 /// Time, derivative of the time, saltation matrix, its part by parameters, condition, why derivatives end there, the matrices by
-/// sides, and the coefficient of a square root.
+/// sides, the coefficient of a square root, and the second derivatives of the time.
 pub type InstantRow<'py> = (
     f64,
     Bound<'py, PyArray1<f64>>,
@@ -28,6 +28,7 @@ pub type InstantRow<'py> = (
     f64,
     &'static str,
     Vec<SideRow<'py>>,
+    Option<Bound<'py, PyArray1<f64>>>,
     Option<Bound<'py, PyArray1<f64>>>,
 );
 
@@ -38,6 +39,20 @@ pub type SideRow<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// The surfaces on which a run starts; is an action done at the initial time, does a clock tick there, and does the run end at an
+/// instant that moves?
+pub type BordersRow = (Vec<usize>, bool, bool, bool);
+
+/// The same, for Python.
+pub fn borders_row(borders: &Borders) -> BordersRow {
+    (
+        borders.starts_on.clone(),
+        borders.starts_at_action,
+        borders.starts_at_tick,
+        borders.ends_at_instant,
+    )
+}
+
 /// The derivatives of a run, or what they need on the way back; and what they are continued with between steps.
 pub struct RunDerivatives {
     found: Derivatives,
@@ -47,6 +62,8 @@ pub struct RunDerivatives {
     extension: Arc<Extension>,
     options: Options,
     span: f64,
+    /// How many rows a column has: the states, and the named discrete states behind them.
+    n: usize,
 }
 
 /// A term of a cost: the function, the time at which it counts, or else the surface at whose switches it does, or neither for the
@@ -79,7 +96,7 @@ pub fn run_with_derivatives(
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
     let (solution, found, trail) = if *order == 0 {
-        let mut trail = Trail::default();
+        let mut trail = Trail::of(&extended);
         let solution = problem.solve_observed(&mut trail, interrupt)?;
         (solution, Derivatives::default(), Some(trail))
     } else {
@@ -96,6 +113,7 @@ pub fn run_with_derivatives(
             found,
             trail,
             span,
+            n: extended.n_rows(),
             kinds,
             parameters: parameters.clone(),
             extension: Arc::clone(extension),
@@ -164,9 +182,9 @@ impl RunDerivatives {
         (solution, actions): RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        let n = solution.n_states;
+        let n = self.n;
         if self.found.t.is_empty() {
-            return Ok(times.iter().map(|_| self.not_known(py, n)).collect());
+            return Ok(times.iter().map(|_| self.not_known(py)).collect());
         }
         self.with(system, (solution, actions), |run| {
             let at = |&t: &f64| {
@@ -186,7 +204,7 @@ impl RunDerivatives {
         run: RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        let n = run.0.n_states;
+        let n = self.n;
         let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
         self.with(system, run, |run| {
             let at = |&t: &f64| {
@@ -199,7 +217,8 @@ impl RunDerivatives {
     }
 
     /// The same at the end of the run.
-    pub fn second_at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+    pub fn second_at_end<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let n = self.n;
         let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
         let last = self.found.second.len().checked_sub(n * n_pairs);
         let known = last.map(|last| &self.found.second[last..]);
@@ -258,7 +277,7 @@ impl RunDerivatives {
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<LostAt>, Vec<usize>)> {
+    ) -> PyResult<(Vec<f64>, Option<LostAt>, BordersRow)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
@@ -296,21 +315,21 @@ impl RunDerivatives {
         };
         let found = way.gradient(&terms).map_err(raised)?;
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
-        Ok((entries, found.lost, found.starts_on))
+        Ok((entries, found.lost, borders_row(&found.borders)))
     }
 
     /// The derivative of the state at the end; NaN if the run took no step.
-    pub fn at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
-        let size = n * self.kinds.len();
+    pub fn at_end<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let size = self.n * self.kinds.len();
         match self.found.values.len().checked_sub(size) {
-            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), n),
-            None => self.not_known(py, n),
+            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), self.n),
+            None => self.not_known(py),
         }
     }
 
-    fn not_known<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+    fn not_known<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let k = self.kinds.len();
-        transposed(py, &vec![f64::NAN; n * k], k, n)
+        transposed(py, &vec![f64::NAN; self.n * k], k, self.n)
     }
 
     /// The mode and the discrete states at the start of a run that was kept for the way back, and its instants.
@@ -321,9 +340,9 @@ impl RunDerivatives {
         Some((mode.entries().to_vec(), q.to_vec(), rows.collect()))
     }
 
-    /// The surfaces on which the run starts and that it leaves.
-    pub fn starts_on(&self) -> &[usize] {
-        &self.found.starts_on
+    /// Where the derivatives are those of one side.
+    pub fn borders(&self) -> &Borders {
+        &self.found.borders
     }
 
     /// Where derivatives end, and why.
@@ -333,8 +352,8 @@ impl RunDerivatives {
     }
 
     /// The derivatives of all instants.
-    pub fn instants<'py>(&self, py: Python<'py>, n: usize) -> Vec<InstantRow<'py>> {
-        let m = self.parameters.len();
+    pub fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
+        let (n, m) = (self.n, self.parameters.len());
         let rows = |values: &[f64], width: usize| {
             let rows: Vec<Vec<f64>> = (0..n)
                 .map(|r| values[r * width..(r + 1) * width].to_vec())
@@ -346,6 +365,7 @@ impl RunDerivatives {
         instants
             .map(|found| {
                 let root = !found.square_root.is_empty();
+                let bends = !found.second_dt.is_empty();
                 let side = |side: &OneSided| {
                     let order = side.order.clone();
                     (
@@ -363,6 +383,7 @@ impl RunDerivatives {
                     found.lost.map_or("", filippov::derivative::Lost::name),
                     found.sides.iter().map(side).collect(),
                     root.then(|| PyArray1::from_slice(py, &found.square_root)),
+                    bends.then(|| PyArray1::from_slice(py, &found.second_dt)),
                 )
             })
             .collect()

@@ -268,9 +268,9 @@ impl HeldMotions {
         ask: impl FnOnce(&mut HeldMotion) -> PyResult<R>,
     ) -> PyResult<R> {
         let mode = Mode::new(mode);
-        self.with(q, |_, extended, _| {
+        self.with(q, |system, extended, _| {
             let impacts = extended.impacts();
-            let mut motion = HeldMotion::new(extended, &impacts, &self.options, &mode, q);
+            let mut motion = HeldMotion::new((system, extended), &impacts, &self.options, &mode, q);
             ask(&mut motion)
         })
     }

@@ -1,12 +1,14 @@
 //! The Python binding: converts arguments, calls the core, converts results. No mathematics.
 
 mod black_boxes;
+mod boxes;
 mod builder;
 mod callbacks;
 mod clock;
 mod conversion;
 mod decisions;
 mod derivatives;
+mod exponents;
 mod inspect;
 mod itineraries;
 mod laws;
@@ -27,6 +29,8 @@ mod _core {
     #[pymodule_export]
     use super::black_boxes::{OpaqueSystem, SignedSystem};
     #[pymodule_export]
+    use super::boxes::ModeBounds;
+    #[pymodule_export]
     use super::builder::Builder;
     #[pymodule_export]
     use super::callbacks::TracedEvent;
@@ -34,6 +38,8 @@ mod _core {
     use super::clock::ManualClock;
     #[pymodule_export]
     use super::decisions::replay_decision;
+    #[pymodule_export]
+    use super::exponents::growth_many;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]

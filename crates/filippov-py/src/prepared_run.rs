@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use filippov::action::{Action, ActionMap, Actions, Trigger};
-use filippov::derivative::Extension;
+use filippov::derivative::{Extension, Growth};
 use filippov::section::Section;
 use filippov::{
-    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Options,
-    Problem, Solution, TracedMap, UserEvent, UserFunction,
+    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Laws,
+    Options, Piece, Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
 use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent, TracedEvent};
 use crate::derivatives::{run_with_derivatives, Failure, RunDerivatives, Wanted};
+use crate::exponents::run_with_growth;
 use crate::run::Run;
 use crate::saved::read_trigger;
 use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
@@ -32,6 +33,8 @@ pub struct PreparedRun {
     given: Vec<(SharedMap, Trigger, String)>,
     laws: Vec<LawAction>,
     law_names: Vec<String>,
+    /// All laws, for what is asked for that the run does not follow.
+    all_laws: Option<Arc<Laws>>,
     discrete: Vec<f64>,
     n_visible: usize,
     is_native: bool,
@@ -76,6 +79,7 @@ impl PreparedRun {
         Ok(PreparedRun {
             n_visible: n_visible_of(system, &*core),
             law_names: traced.map_or_else(Vec::new, |t| t.get().law_names()),
+            all_laws: traced.map(|t| Arc::clone(&t.get().laws)),
             is_native: traced.is_some_and(|t| t.get().system.is_native()),
             core,
             compiled,
@@ -133,6 +137,23 @@ impl PreparedRun {
         Ok((solution, Some(derivatives)))
     }
 
+    /// Runs, and follows the growth of small changes, kept at these times.
+    pub fn run_with_growth(
+        &self,
+        t_span: (f64, f64),
+        marks: &[f64],
+        (options, extension): (&Options, &Arc<Extension>),
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<(Solution, Growth), Failure> {
+        let system = self.compiled.as_ref().ok_or(Failure::CalledMap)?;
+        let actions = self.actions();
+        let problem = Problem::new(&**system, t_span, &self.y0)
+            .options(options)
+            .actions(&actions);
+        let of = (&**system, extension, &actions);
+        run_with_growth(problem, of, options, marks, interrupt)
+    }
+
     fn user_events(&self) -> Vec<UserEvent<'_>> {
         let events = self.events.iter();
         let events = events.map(|(function, direction, terminal)| UserEvent {
@@ -164,6 +185,17 @@ impl PreparedRun {
         point: &DecisionPoint,
     ) -> Result<DecisionOutcome, FieldError> {
         replay_decision(&*self.core, &self.actions(), options, point)
+    }
+
+    /// Brings the discrete states of a piece that the run did not follow up to date with a point of it.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn follow_idle(&self, piece: &mut Piece, at: (f64, &[f64])) -> Result<(), FieldError> {
+        match (&self.all_laws, &self.compiled) {
+            (Some(laws), Some(system)) => laws.follow_idle(system, at, &mut piece.discrete),
+            _ => Ok(()),
+        }
     }
 
     /// The system with its parameters, if it is traced.

@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
-use crate::derivatives::{InstantRow, LostAt, RunDerivatives, TermRow};
+use crate::derivatives::{borders_row, BordersRow, InstantRow, LostAt, RunDerivatives, TermRow};
 use crate::itineraries::TrailRows;
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem, TracedSystem};
@@ -465,7 +465,9 @@ impl Run {
             let found = solution.evaluate(system, t, side, &mut y).map_err(raised)?;
             found.ok_or_else(|| outside(&solution, t))?;
             let piece = solution.piece_at(system, t, side).map_err(raised)?;
-            let piece = piece.unwrap_or_default();
+            let mut piece = piece.unwrap_or_default();
+            let followed = self.prepared.follow_idle(&mut piece, (t, &y));
+            followed.map_err(raised)?;
             let held = piece.held(system, &actions, solution.sliding, (t, &y));
             let signal = Signal {
                 expression: &expression.expression,
@@ -484,8 +486,10 @@ impl Run {
         contacts: Vec<usize>,
     ) -> PyResult<f64> {
         let solution = self.solution();
-        let piece = solution.last_piece();
+        let mut piece = solution.last_piece();
         let at = (solution.t_last, solution.last_state());
+        let followed = self.prepared.follow_idle(&mut piece, at);
+        followed.map_err(raised)?;
         let actions = self.prepared.actions();
         let held = piece.held(&**self.system(), &actions, solution.sliding, at);
         let signal = Signal {
@@ -567,26 +571,26 @@ impl Run {
         &self,
         py: Python<'py>,
         terms: Vec<TermRow<'py>>,
-    ) -> PyResult<(Vector<'py>, Option<LostAt>, Vec<usize>)> {
+    ) -> PyResult<(Vector<'py>, Option<LostAt>, BordersRow)> {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Err(PyValueError::new_err("the run has no derivatives"));
         };
         let run = (&*self.solution(), &self.prepared.actions());
-        let (entries, lost, starts_on) = derivatives.gradient(system, run, &terms)?;
-        Ok((PyArray1::from_vec(py, entries), lost, starts_on))
+        let (entries, lost, borders) = derivatives.gradient(system, run, &terms)?;
+        Ok((PyArray1::from_vec(py, entries), lost, borders))
     }
 
     /// The same at the end of the run.
     fn derivatives_at_end<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
-        let n = self.solution().n_states;
         let derivatives = self.derivatives.as_ref();
-        derivatives.map(|derivatives| derivatives.at_end(py, n))
+        derivatives.map(|derivatives| derivatives.at_end(py))
     }
 
-    /// The surfaces on which the run starts and that it leaves: the derivatives are those of one side.
-    fn starts_on(&self) -> Vec<usize> {
+    /// Where the derivatives are those of one side: the surfaces on which the run starts, whether an action is done or a clock ticks
+    /// at the initial time, and whether the run ends at an instant that moves.
+    fn borders(&self) -> BordersRow {
         let derivatives = self.derivatives.as_ref();
-        derivatives.map_or_else(Vec::new, |derivatives| derivatives.starts_on().to_vec())
+        derivatives.map_or_else(Default::default, |d| borders_row(d.borders()))
     }
 
     /// The mixed second derivatives of the state at the times `t`, each of shape (n, pairs of columns); at the end without times.
@@ -602,7 +606,7 @@ impl Run {
         };
         let solution = self.solution();
         let Some(t) = t else {
-            return Ok(vec![derivatives.second_at_end(py, solution.n_states)]);
+            return Ok(vec![derivatives.second_at_end(py)]);
         };
         let run = (&*solution, &self.prepared.actions());
         let when = (t.as_slice()?, side_of(left));
@@ -620,7 +624,7 @@ impl Run {
         let derivatives = self.derivatives.as_ref();
         derivatives.is_some_and(|found| {
             let ends = found.lost().is_some() || found.second_lost().is_some();
-            ends || !found.starts_on().is_empty()
+            ends || !found.borders().is_empty()
         })
     }
 
@@ -631,9 +635,8 @@ impl Run {
 
     /// The derivatives of all instants.
     fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
-        let n = self.solution().n_states;
         let derivatives = self.derivatives.as_ref();
-        derivatives.map_or_else(Vec::new, |derivatives| derivatives.instants(py, n))
+        derivatives.map_or_else(Vec::new, |derivatives| derivatives.instants(py))
     }
 
     /// The first `n` discrete states at the times `t`, shape (n, len(t)); those at the end if no segments are kept.

@@ -127,16 +127,17 @@ impl Signals<'_> {
         run: &PreparedRun,
         rule: SlidingRule,
         (t, y): (f64, &[f64]),
-        piece: &Piece,
+        mut piece: Piece,
     ) -> Vec<f64> {
-        let held = piece.held(&**run.core(), &run.actions(), rule, (t, y));
+        let followed = run.follow_idle(&mut piece, (t, y));
+        let held = followed.and_then(|()| piece.held(&**run.core(), &run.actions(), rule, (t, y)));
         let value = |output: &Output| match &held {
             Ok(held) => {
                 let signal = Signal {
                     expression: &output.expression,
                     contacts: &output.contacts,
                 };
-                signal.value((t, y), self.p, piece, held)
+                signal.value((t, y), self.p, &piece, held)
             }
             Err(_) => f64::NAN,
         };
@@ -403,12 +404,12 @@ impl Points {
         let returns = solution.returns.take().unwrap_or_default();
         if self.n_outputs > 0 {
             let end = (solution.t_last, solution.last_state());
-            let last = signals.values(run, solution.sliding, end, &solution.last_piece());
+            let last = signals.values(run, solution.sliding, end, solution.last_piece());
             self.outputs_last.extend(last);
             for kept in &returns.kept {
                 let at = (kept.t, &kept.y[..]);
                 let piece = kept.piece.as_deref().cloned().unwrap_or_default();
-                let values = signals.values(run, solution.sliding, at, &piece);
+                let values = signals.values(run, solution.sliding, at, piece);
                 self.outputs.extend(values);
             }
         }

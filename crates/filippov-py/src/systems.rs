@@ -7,6 +7,7 @@ use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
     Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting, SignStructure,
 };
+use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -290,7 +291,7 @@ impl TracedSystem {
 #[pymethods]
 impl TracedSystem {
     #[new]
-    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0, sticking=Vec::new()))]
+    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0, sticking=Vec::new(), beside=Vec::new()))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -303,6 +304,7 @@ impl TracedSystem {
         laws: Vec<LawRow>,
         n_hidden: usize,
         sticking: Vec<(usize, u32)>,
+        beside: Vec<usize>,
     ) -> PyResult<Self> {
         if field.len() != n_states {
             let text = format!(
@@ -329,6 +331,7 @@ impl TracedSystem {
             laws: laws.collect::<PyResult<_>>()?,
             n_hidden,
             sticking: sticking.collect::<PyResult<_>>()?,
+            beside,
         };
         let definition = Definition {
             graph,
@@ -352,6 +355,11 @@ impl TracedSystem {
     #[getter]
     fn n_laws(&self) -> usize {
         self.laws.list().len()
+    }
+
+    /// The indices of the laws that a run does not follow, since nothing reads their discrete states.
+    fn idle_laws(&self) -> Vec<usize> {
+        self.laws.idle()
     }
 
     fn surfaces(&self) -> Vec<String> {
@@ -428,6 +436,22 @@ impl TracedSystem {
 
     fn is_native(&self) -> bool {
         self.system.is_native()
+    }
+
+    /// The names of all discrete states, those of laws included.
+    fn laws(&self) -> Vec<String> {
+        self.law_names()
+    }
+
+    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign, `eps` its last parameter.
+    fn regularized(&self, eps: &str, kappa: Vec<f64>, is_linear: bool) -> PyResult<Self> {
+        if kappa.len() != self.system.n_surfaces() || !self.law_names().is_empty() {
+            return Err(PyValueError::new_err(
+                "a number per surface, and no laws, are needed",
+            ));
+        }
+        let ramp = if is_linear { Ramp::Linear } else { Ramp::Tanh };
+        Self::build(self.definition().regularized(eps, &kappa, ramp))
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {

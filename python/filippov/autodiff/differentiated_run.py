@@ -80,7 +80,8 @@ class DifferentiatedRun:
         states = sol.sol(self.times)
         if wrt is None:
             return states, {}
-        columns = np.moveaxis(sol.derivative(self.times), 1, 0)
+        # The rows of discrete states are behind those of the states.
+        columns = np.moveaxis(sol.derivative(self.times)[: len(states)], 1, 0)
         n = len(states) if "y0" in wrt else 0
         by_params = dict(zip([name for name in wrt if name != "y0"], columns[n:], strict=True))
         return states, {"y0": columns[:n], **by_params} if n else by_params

@@ -1,4 +1,4 @@
-"""One step along a curve that N equations in N + 1 unknowns define: prediction along the tangent, then Newton's method.
+"""One step along a curve of N equations in N + 1 unknowns: a prediction, then Newton's method.
 
 Reference: Allgower, Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
 """

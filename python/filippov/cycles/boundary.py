@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.errors import ModelError
 
 __all__ = ["beyond_boundary"]
@@ -19,7 +19,7 @@ __all__ = ["beyond_boundary"]
 def beyond_boundary(
     state: Equilibrium, surface: int, name: str, bounds: tuple[float, float] = (-np.inf, np.inf)
 ) -> tuple[Equilibrium, float] | None:
-    """Return the equilibrium of another mode that goes on from a boundary, and in which direction of a parameter.
+    """Return the equilibrium of another mode that goes on from a boundary, and where a parameter leads it.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def beyond_boundary(
         Its range.
     """
     curve = state._curve
-    n, before = curve.n, curve.mode[surface]
+    before = curve.mode[surface]
     value = state.params[name]
     size = abs(value) or 1.0
     if before == 0:

@@ -9,10 +9,10 @@ import numpy as np
 
 from filippov.analysis.optional import need
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium
+from filippov.cycles.rest import Equilibrium
 from filippov.errors import InputError
 
-__all__ = ["CODES", "Branch", "Point", "Special", "SpecialPoints"]
+__all__ = ["CHANGES", "CODES", "Branch", "Point", "Special", "SpecialPoints"]
 
 State = Cycle | Equilibrium
 
@@ -34,6 +34,10 @@ CODES = {
     "UZ": "a monitor vanishes",
     "EP": "end",
 }
+
+
+# At these the flow takes another itinerary.
+CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 
 
 class Point(NamedTuple):
@@ -239,6 +243,11 @@ class Branch:
             raise InputError(f"{name}: the branch does not come to {value:g}")
         k = int(places[0])
         nearer = k if abs(along[k]) <= abs(along[k + 1]) else k + 1
+        for special in self.special:
+            # Between two points at which the flow takes different itineraries the special point decides.
+            if special.point == k and special.code in CHANGES:
+                change = special.params[name] - float(value)
+                nearer = k if change * along[k + 1] >= 0 else k + 1
         assert self._at_value is not None
         return self._at_value(self.points[nearer].state, name, float(value))
 

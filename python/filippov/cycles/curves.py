@@ -1,6 +1,7 @@
-"""Curves of special points in two parameters: the equations of a cycle or equilibrium with the condition of the point.
+"""Curves of special points in two parameters: the equations of a branch with the condition of the point.
 
-References: Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 10.3; di Bernardo et al. (2008), chapter 8.
+References: Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 10.3; di Bernardo et al. (2008),
+chapter 8.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
-from filippov.cycles.continuation import AnyCurve, bounds_of, curve_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import EquilibriumCurve, differences
+from filippov.cycles.following import AnyCurve, bounds_of, curve_of
+from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, local_probe, probes_of
-from filippov.cycles.tests import singular_values_of
+from filippov.cycles.rest import differences
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import positive
@@ -56,7 +57,7 @@ class _ProbeCondition:
         self._share = (at - place[n]) / place[n + 1]
 
     def _local(self, v: Array) -> tuple[float, float, float]:
-        """Return test function, next derivative and share of the leg; from its start, duration and parameters."""
+        """Return test function, next derivative and share of its leg, from where and how long that is."""
         n = self.curve.shooting.n
         self.curve.shooting.motions.move(v[n + 2 :])
         return local_probe(self.curve.shooting, self.key, v[:n], float(v[n]), float(v[n + 1]), self._share)
@@ -143,7 +144,9 @@ def curve_in_two(
         If Newton's method does not converge at the start.
     """
     if not isinstance(start, Special) or start.test is None:
-        raise InputError("start: with two parameters a special point of a branch is needed, branch.special[..]")
+        raise InputError(
+            "start: with two parameters a special point of a branch is needed, branch.special[..]"
+        )
     if len(names) != 2 or names[0] == names[1]:
         raise InputError(f"parameter: one name or two are needed, not {names!r}")
     params = start.state.params
@@ -151,11 +154,15 @@ def curve_in_two(
         if name not in params or name in start.state.system.discrete:
             raise InputError(f"parameter: the system has no parameter {name!r}{did_you_mean(name, params)}")
     if not isinstance(bounds, Mapping) or set(bounds) != set(names):
-        raise InputError(f"bounds: a dict with the ranges of {names[0]} and {names[1]} is needed, not {bounds!r}")
+        raise InputError(
+            f"bounds: a dict with the ranges of {names[0]} and {names[1]} is needed, not {bounds!r}"
+        )
     ranges = tuple(bounds_of(bounds[name], name) for name in names)
     for name, (low, high) in zip(names, ranges, strict=True):
         if not low <= params[name] <= high:
-            raise InputError(f"bounds: the start has {name} = {params[name]:g}, outside of ({low:g}, {high:g})")
+            raise InputError(
+                f"bounds: the start has {name} = {params[name]:g}, outside of ({low:g}, {high:g})"
+            )
     sizes = tuple(high - low for low, high in ranges)
     share = _FIRST_STEP if step is None else positive("step", step) / sizes[0]
     sides = [_CurveSide(start, names, ranges, sizes, direction) for direction in (-1.0, 1.0)]
@@ -278,7 +285,7 @@ class _CurveSide:
         self.reason = f"{most} points"
 
     def _ends_nearby(self) -> bool:
-        """Whether the condition becomes degenerate just behind the last point, where the equations are singular too."""
+        """Whether the condition is degenerate just behind, where the equations are singular too."""
         key = ("degenerate",)
         # Of points that are too near the difference is noise.
         latest: list[tuple[Array, float]] = []
@@ -324,7 +331,11 @@ class _CurveSide:
         for _, key, there in found:
             is_degenerate = key[0] == "degenerate"
             code = "CP" if is_degenerate else key[0]
-            kind = f"{CODES[code]} of {self.code}" if is_degenerate else f"{CODES[code]}, on a curve of {self.code}"
+            kind = (
+                f"{CODES[code]} of {self.code}"
+                if is_degenerate
+                else f"{CODES[code]}, on a curve of {self.code}"
+            )
             params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
             state = self.extended.curve.state(there.w, there.error)
             special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
@@ -340,8 +351,8 @@ class _CurveSide:
 
     def _located(self, key: Any, point: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
         scale = self.extended.scales(self.w)
-        level = self.w / scale @ self.tangent
-        length = point.w / scale @ self.tangent - level
+        level = float(self.w / scale @ self.tangent)
+        length = float(point.w / scale @ self.tangent) - level
         start = self.w
 
         def there(s: float) -> Step:

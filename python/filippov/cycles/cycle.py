@@ -11,7 +11,13 @@ import numpy.typing as npt
 
 from filippov.analysis import Phase, Section
 from filippov.analysis.sections import as_section
-from filippov.cycles.forcing import GivenPeriod, InferredPeriod, depends_on_time, forcing_of
+from filippov.cycles.forcing import (
+    GivenPeriod,
+    InferredPeriod,
+    common_period,
+    depends_on_time,
+    forcing_of,
+)
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
 from filippov.cycles.shooting import Period, Shooting, Shot, solve
@@ -25,7 +31,7 @@ from filippov.unknown import did_you_mean
 
 __all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
 
-_MOST_RETURNS = 32
+_MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
 
 
@@ -46,7 +52,7 @@ class CycleDerivative(NamedTuple):
 
     y0: Array
     period: float
-    times: Array
+    times: npt.NDArray[Any]
     states: Array
 
 
@@ -137,31 +143,44 @@ class Cycle:
     @cached_property
     def solution(self) -> Solution:
         """The run over one period."""
-        return self._shooting.motions.run((self.t0, self.t0 + self.period), self.y0)
+        ending = self.itinerary.legs[-1].ending
+        # A run does what is to be done at its first time.
+        is_timed = ending is not None and ending.guard is None
+        start = self.at(self.t0, before=True) if is_timed else self.y0
+        return self._shooting.motions.run((self.t0, self.t0 + self.period), start)
 
     @cached_property
     def is_admissible(self) -> bool:
         """Whether the flow follows the itinerary: a run from the start makes the same pieces."""
         return follows_itinerary(self)
 
-    def at(self, t: float) -> Array:
-        """Return the state at a time, modulo the period; behind a switch if one is then.
+    def at(self, t: float, *, before: bool = False) -> Array:
+        """Return the state at a time, modulo the period.
 
         Parameters
         ----------
         t : float
+        before : bool, optional
+            Before a switch that is at this time, and not behind it.
 
         Returns
         -------
         ndarray, shape (n,)
         """
         itinerary, motions = self.itinerary, self._shooting.motions
-        t = self.t0 + (t - self.t0) % self.period
+        rounding = 1e-10 * self.period
+        t = self.t0 + (t - self.t0 + rounding) % self.period - rounding
         since = self.t0
-        for leg, start, duration in zip(itinerary.legs, itinerary.starts, itinerary.durations, strict=True):
-            if t < since + duration or leg is itinerary.legs[-1]:
-                return start if t <= since else motions.leg(leg.mode, leg.discrete, since, start, t - since).x
-            since += duration
+        if abs(t - since) <= rounding:
+            return self._shot.passages[-1].leg.x if before else self.y0
+        for k, (leg, start) in enumerate(zip(itinerary.legs, itinerary.starts, strict=True)):
+            until = since + itinerary.durations[k]
+            if abs(t - until) <= rounding:
+                passage = self._shot.passages[k]
+                return passage.leg.x if before else passage.after
+            if t < until or k + 1 == len(itinerary.legs):
+                return motions.leg(leg.mode, leg.discrete, since, start, t - since).x
+            since = until
         raise AssertionError  # there is a leg
 
     def from_event(self) -> Cycle:
@@ -169,7 +188,19 @@ class Cycle:
         if self.itinerary.is_closed_by_event() or not self.itinerary.has_events():
             return self
         shooting = self._shooting
-        return cycle_at(shooting.motions, self.t0, self.y0, self.period, shooting.period)
+        return cycle_at(shooting.motions, *self.inside(), self.period, shooting.period)
+
+    def inside(self) -> tuple[float, Array]:
+        """Return a time and the state then in the middle of a piece, a long one that loses few dimensions.
+
+        A run can start there: at a switch, and in contact, the state does not say what it does.
+        """
+        itinerary, motions = self.itinerary, self._shooting.motions
+        lost = [_codimension(motions, leg) for leg in itinerary.legs]
+        ranked = zip(lost, (-duration for duration in itinerary.durations), strict=True)
+        place = min(range(len(lost)), key=list(ranked).__getitem__)
+        t = self.t0 + sum(itinerary.durations[:place]) + 0.5 * itinerary.durations[place]
+        return t, self.at(t)
 
     def derivative(self, name: str) -> CycleDerivative:
         """Return the derivative by a parameter.
@@ -195,7 +226,8 @@ class Cycle:
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian
-        du = -np.linalg.solve(jacobian[:, :size], jacobian[:, size])
+        solved = np.linalg.solve(jacobian[:, :size], -jacobian[:, size])
+        du: Array = np.asarray(solved, dtype=np.float64)
         states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]
         since = float(du[m * (n + 1)]) if shooting.is_free_in_time else 0.0
         times = since + np.cumsum(durations)
@@ -206,12 +238,13 @@ class Cycle:
             shift = -float(by_state @ start + by_name) / float(by_state @ velocity)
             start = start + shift * velocity
         ended = [i for i, leg in enumerate(self.itinerary.legs) if leg.ending is not None]
-        after = states[[(i + 1) % m for i in ended]]
-        return CycleDerivative(start, float(np.sum(durations)), times[ended] - shift, after)
+        after: Array = np.asarray(states[[(i + 1) % m for i in ended]], dtype=np.float64)
+        moved: Array = np.asarray(times[ended] - shift, dtype=np.float64)
+        return CycleDerivative(start, float(np.sum(durations)), moved, after)
 
-    def plot(self, *names: str, **options: Any) -> Any:
+    def plot(self, **options: Any) -> Any:
         """Draw the cycle; see `Solution.plot`."""
-        return self.solution.plot(*names, **options)
+        return self.solution.plot(**options)
 
     def __repr__(self) -> str:
         stable = "stable" if self.is_stable else "unstable"
@@ -252,39 +285,29 @@ def _slopes_of(
     def value(y: Array, params: Mapping[str, float]) -> float:
         return float(section(t, y, **{key: params[key] for key in names}))
 
-    def slope(function: Callable[[float], float], size: float) -> float:
-        d = 6e-6 * max(abs(size), 1e-3)
-        return (function(d) - function(-d)) / (2 * d)
-
-    by_state = [
-        slope(lambda d, e=e: value(y + d * e, params), v) for e, v in zip(np.eye(len(y)), y, strict=True)
-    ]
+    sizes = 6e-6 * np.maximum(np.abs(y), 1e-3)
+    moves = zip(np.eye(len(y)), sizes, strict=True)
+    by_state = [(value(y + d * e, params) - value(y - d * e, params)) / (2 * d) for e, d in moves]
     p = params[name]
-    return np.array(by_state), slope(lambda d: value(y, {**params, name: p + d}), p)
+    d = 6e-6 * max(abs(p), 1e-3)
+    above, below = ({**params, name: p + change} for change in (d, -d))
+    return np.array(by_state), (value(y, above) - value(y, below)) / (2 * d)
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
-    """Whether a run from the middle of the longest leg makes the pieces of a cycle."""
-    itinerary, motions = cycle.itinerary, cycle._shooting.motions
-    longest = int(np.argmax(itinerary.durations))
-    leg = itinerary.legs[longest]
-    t = itinerary.t0 + sum(itinerary.durations[:longest])
-    half = 0.5 * itinerary.durations[longest]
-    x = motions.leg(leg.mode, leg.discrete, t, itinerary.starts[longest], half).x
-    if not itinerary.is_closed_by_event() and longest == 0:
-        t, x = itinerary.t0, itinerary.starts[0]
-    else:
-        t += half
+    """Whether a run from within a cycle makes its pieces."""
+    (t, x), period = cycle.inside(), cycle.period
     try:
-        record = motions.record((t, t + itinerary.period), x)
-        found = itinerary_of(record, t + itinerary.period)
+        record = cycle._shooting.motions.record((t, t + 1.02 * period), x)
+        found = itinerary_of(record, t, t + period)
     except ModelError:
         return False
-    own, theirs = _kinds(itinerary), _kinds(found)
+    own, theirs = _kinds(cycle.itinerary), _kinds(found)
     if len(own) != len(theirs):
         return False
     is_same = not own or any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
-    end = record.solution.y[:, -1]
+    assert record.solution.sol is not None
+    end = record.solution.sol(t + period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
     return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
@@ -333,8 +356,8 @@ def limit_cycle(
     t0 : float, optional
         Time of the start.
     transient : int, optional
-        How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0: none;
-        `y0` is a guess, and the cycle may be unstable.
+        How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0:
+        none; `y0` is a guess, and the cycle may be unstable.
     **options
         Options of `solve_ivp` for all runs, among them ``rtol`` (default 1e-12) and ``atol`` (1e-13).
 
@@ -351,7 +374,8 @@ def limit_cycle(
 
     References
     ----------
-    Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008) 13.
+    Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008)
+    13.
 
     Examples
     --------
@@ -410,11 +434,13 @@ def cycle_at(
         record = motions.record((t0, t0 + 2.05 * duration), x)
         itinerary = itinerary_from_event(record, duration)
     if itinerary is None:
-        record = motions.record((t0, t0 + duration), x)
-        itinerary = itinerary_of(record, t0 + duration)
+        record = motions.record((t0, t0 + 1.02 * duration), x)
+        itinerary = itinerary_of(record, t0, t0 + duration)
     found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
     if abs(found.period - duration) > 0.5 * duration:
-        raise ModelError(f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}")
+        raise ModelError(
+            f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}"
+        )
     return found
 
 
@@ -438,16 +464,18 @@ def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
         held = np.array(shooting.legs[i + 1].discrete)
         if held.size and np.max(np.abs(held - passage.discrete)) > 1e-9 * (1 + np.max(np.abs(held))):
             raise ModelError(
-                "the cycle holds samples of its state: they change with it, and are no constants of its pieces"
+                "the cycle holds samples of its state: they change with it, and its pieces have no constants"
             )
 
 
-def _check_section(section: Any) -> Phase | Event | Callable[..., Any] | None:
-    if section is None or isinstance(section, (Phase, Event)) or callable(section):
+def _check_section(section: Any) -> Phase | Event | None:
+    if section is None or isinstance(section, (Phase, Event)):
         return section
+    if callable(section):
+        return Event(section)
     if isinstance(section, Section) and callable(section.where):
         return Event(section.where, section.direction)
-    as_section(section)
+    as_section(section)  # what is none is refused there
     raise InputError("section: a function g(t, y), an Event or a Phase says where a cycle starts")
 
 
@@ -477,7 +505,10 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
     if forcing is None:
         span, solution = _first_span(motions, t0, x)
         steps = np.diff(solution.t)
-        if depends_on_time(motions, span):
+        ticks = _ticks(motions, t0, x, span)
+        if ticks is not None:
+            forcing = GivenPeriod(common_period(motions, ticks))
+        elif depends_on_time(motions, span):
             step = float(np.median(steps[steps > 0]))
             forcing = forcing_of(motions, 0.5 * step, span)
             if forcing is None:
@@ -485,10 +516,6 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
                     "the system depends on time, and no period of field and switching functions was found: "
                     "give period=, a number or a function of the parameters"
                 )
-        else:
-            ticks = _ticks(motions, t0, x, span)
-            if ticks is not None:
-                forcing = GivenPeriod(ticks)
     if forcing is not None:
         return _repeated_forced(motions, t0, x, forcing, 200 if transient is None else transient)
     return _repeated(motions, t0, x, span)
@@ -529,11 +556,14 @@ def _repeated_forced(
         return cycle_at(motions, t0, x, single, forcing)
     for attempt in range(4):
         count = transient * 4**attempt
-        strobes = t0 + single * np.arange(count, count + _MOST_RETURNS + 1)
-        solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes, dense_output=False)
+        phases = t0 + single * (count + (np.arange(_PHASES) + 0.381966) / _PHASES)
+        strobes = (phases + single * np.arange(_MOST_RETURNS + 1)[:, None]).ravel()
+        solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes)
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
-        points = solution.y
+        # A run can start where no surface is slid on.
+        phase = int(np.argmin([solution.mode_at(t).codimension for t in phases]))
+        start, points = float(phases[phase]), solution.y[:, phase::_PHASES]
         size = np.max(np.abs(points), axis=1) + 1e-12
         distances = np.max(np.abs(points[:, 1:] - points[:, :1]) / size[:, None], axis=0)
         near = max(_NEAR, 10 * float(np.min(distances))) if np.min(distances) < 1e-2 else 0.0
@@ -542,7 +572,11 @@ def _repeated_forced(
             multiple = int(alike[0]) + 1
             forcing.multiple = multiple
             try:
-                found = cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+                found = cycle_at(motions, start, points[:, 0], multiple * single, forcing)
+                turns = _turns(found, multiple)
+                if turns > 1:
+                    forcing.multiple = multiple // turns
+                    found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
                 if _attracts(found):
                     return found
             except ModelError:
@@ -550,8 +584,8 @@ def _repeated_forced(
                     raise
     raise ModelError(
         f"no cycle was found: after {count} periods of the forcing the run does not repeat itself within "
-        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be chaotic, "
-        "quasiperiodic or grow; more of it is simulated with transient="
+        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be "
+        "chaotic, quasiperiodic or grow; more of it is simulated with transient="
     )
 
 
@@ -562,7 +596,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         solution = motions.run((t, t + span), point)
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
-        t, end = t + span, solution.y[:, -1]
+        t, end = _last_inside(solution)
         size = np.max(np.abs(solution.y), axis=1) + 1e-300
         if np.max(np.abs(end) / (1e-300 + np.max(np.abs(x)) + 1.0)) > 1e8:
             raise ModelError(
@@ -571,14 +605,16 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         point = end
         velocity = motions.record((t, t + 1e-6 * span), point)
         at = motions.at(velocity.mode, velocity.discrete, t, point).velocity
-        later = solution.y[:, len(solution.t) // 2 :]
+        assert solution.sol is not None
+        later = solution.sol(np.linspace(solution.t[-1] - 0.25 * span, solution.t[-1], 64))
         moves = np.max(np.ptp(later, axis=1) / size)
         if moves < 1e-7 or not np.any(at):
             raise ModelError(
-                f"no cycle was found: the run comes to rest at {_short(end)}; fl.equilibrium finds where"
+                f"no cycle was found: the run comes to rest at {_short(solution.y[:, -1])}; fl.equilibrium "
+                "finds where"
             )
         returns = motions.run((t, t + span), point, events=Event(_plane(at, point), direction=1))
-        times, points = returns.t_events[0], returns.y_events[0]
+        times, points = _first_event(returns)
         later_ones = times > t + 1e-9 * span
         times, points = times[later_ones], points[later_ones]
         if len(times):
@@ -590,6 +626,9 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
+                    turns = _turns(found, len(found.itinerary.legs))
+                    if turns > 1:
+                        found = cycle_at(motions, *found.inside(), found.period / turns, None)
                     if _attracts(found):
                         return found
                     problem = ", and the cycle near it is unstable"
@@ -602,9 +641,38 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
     )
 
 
+def _first_event(run: Solution) -> tuple[Array, Array]:
+    """Return the times and the states of the first event of a run."""
+    assert run.t_events is not None
+    assert run.y_events is not None
+    return run.t_events[0], run.y_events[0]
+
+
+def _last_inside(run: Solution) -> tuple[float, Array]:
+    """Return the last place of a run in the middle of a piece that slides on no surface; or else its end."""
+    assert run.sol is not None
+    for segment in run.segments[::-1][:_MOST_RETURNS]:
+        if segment.mode.codimension == 0 and segment.t_end > segment.t_start:
+            t = 0.5 * (segment.t_start + segment.t_end)
+            return t, run.sol(t)
+    return float(run.t[-1]), run.y[:, -1]
+
+
 def _attracts(cycle: Cycle) -> bool:
     """Whether a run may have come to a cycle: near chaos Newton's method finds unstable ones."""
     return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
+
+
+def _turns(cycle: Cycle, most: int) -> int:
+    """Return how many times a cycle goes round another one, at most so many times."""
+    size = 1e-8 * np.max(np.abs(np.array(cycle.itinerary.starts)))
+    t, x = cycle.t0 + 0.381966 * cycle.period / most, None
+    for turns in range(most, 1, -1):
+        if most % turns == 0:
+            x = cycle.at(t) if x is None else x
+            if np.max(np.abs(cycle.at(t + cycle.period / turns) - x)) < size:
+                return turns
+    return 1
 
 
 def _plane(normal: Array, point: Array) -> Callable[..., Any]:
@@ -618,26 +686,36 @@ def _short(x: Array) -> str:
     return np.array2string(x, precision=6, threshold=8)
 
 
-def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
+def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     """Return a cycle from where it is to start."""
     motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
-    if isinstance(section, Phase) or (section is None and forcing is not None):
-        turns = np.ceil((cycle.t0 - t0) / period - 1e-9)
-        x = cycle.at(t0 + turns * period)
-        return cycle_at(motions, t0, x, period, forcing, is_free=True)
-    if section is None:
+    is_timed = isinstance(section, Phase) or (section is None and forcing is not None)
+    if section is None and not is_timed:
         return cycle
-    event = section if isinstance(section, Event) else Event(section)
-    there = motions.run((cycle.t0, cycle.t0 + 1.05 * period), cycle.y0, events=event)
-    times, points = there.t_events[0], there.y_events[0]
+    t, x = cycle.inside()
+    if is_timed:
+        turns = np.ceil((t - t0) / period - 1e-9)
+        if _counts_time(cycle.itinerary):
+            start = cycle.at(t0 + turns * period, before=True)
+            return cycle_at(motions, t0, start, period, forcing, is_free=True)
+        record = motions.record((t, t + 2.3 * period), x)
+        at = t0 + float(turns) * period
+        return cycle_of(motions, itinerary_of(record, at, at + period).from_time(t0), forcing)
+    assert isinstance(section, Event)
+    times, _ = _first_event(motions.run((t, t + 1.05 * period), x, events=section))
     if not len(times):
-        raise ModelError(f"section: the cycle does not reach {event.name or 'it'}")
+        raise ModelError(f"section: the cycle does not reach {section.name or 'it'}")
     # At a switch the cycle starts behind it.
-    record = motions.record((cycle.t0, cycle.t0 + 2.2 * period), cycle.y0)
-    at_switch = itinerary_from_event(record, period, at=float(times[0]))
-    if at_switch is None:
-        moved = cycle_at(motions, float(times[0]), points[0], period, forcing, is_free=True)
-    else:
-        moved = cycle_of(motions, at_switch, forcing)
-    moved._section = event.g
+    record, at = motions.record((t, t + 3.2 * period), x), float(times[0])
+    itinerary = itinerary_from_event(record, period, at=at)
+    moved = cycle_of(motions, itinerary or itinerary_of(record, at, at + period), forcing)
+    moved._section = section.g
     return moved
+
+
+def _counts_time(itinerary: Itinerary) -> bool:
+    """Whether clocks tick in a cycle, whose counts belong to a time."""
+    endings = (leg.ending for leg in itinerary.legs)
+    return any(leg.discrete for leg in itinerary.legs) or any(
+        e is not None and e.guard is None for e in endings
+    )

@@ -11,10 +11,14 @@ import numpy as np
 from filippov.analysis import Phase
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
+from filippov.scalars import positive
 
-__all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
+__all__ = ["GivenPeriod", "InferredPeriod", "common_period", "depends_on_time", "forcing_of"]
 
-_PLACES, _CONFIRMED_AT = 7, 3
+_PLACES, _CONFIRMED_AT, _MOST_MULTIPLES = 7, 3, 64
+
+
+_GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 
 @lru_cache(maxsize=16)
@@ -46,11 +50,17 @@ class GivenPeriod:
     """A multiple of a period that the user gives: a number, or a function of parameters by their names."""
 
     def __init__(self, period: float | Callable[..., Any], multiple: int = 1) -> None:
+        if not callable(period):
+            period = positive("period", period)
         self.phase, self.multiple = Phase(period), multiple
 
     def near(self, duration: float) -> GivenPeriod:
         """Return it for cycles of about this duration."""
         return self
+
+    def twice(self) -> GivenPeriod:
+        """Return it for cycles of twice the period."""
+        return GivenPeriod(self.phase.period, 2 * self.multiple)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -76,8 +86,8 @@ class GivenPeriod:
 class InferredPeriod:
     """A multiple of the period of field and switching functions, found from their values.
 
-    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers they are taken, and
-    confirmed at every value.
+    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole
+    numbers they are taken, and confirmed at every value.
     """
 
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
@@ -88,6 +98,10 @@ class InferredPeriod:
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
         return InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+
+    def twice(self) -> InferredPeriod:
+        """Return it for cycles of twice the period."""
+        return InferredPeriod(self.guess, 2 * self.multiple, self.exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -137,7 +151,8 @@ class InferredPeriod:
 def _slope_of_period(motions: Motions, name: str, period: float) -> float:
     """Return the derivative of the period by a parameter.
 
-    Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish together.
+    Where the right-hand side repeats itself for all values of a parameter, its derivatives by that and by the
+    period vanish together.
     """
     params = motions.params
 
@@ -179,17 +194,14 @@ def _refined(motions: Motions, guess: float) -> float:
         slope = (_difference(motions, period + d) - _difference(motions, period - d)) / (2 * d)
         size = float(slope @ slope)
         if size == 0.0:
-            return period
+            raise ModelError(f"the right-hand side jumps and does nothing else in time: {_GIVE_PERIOD}")
         step = -float(slope @ value) / size
         step = float(np.clip(step, -0.1 * period, 0.1 * period))
         period += step
         if abs(step) < 4e-16 * period:
             break
     if not _repeats(motions, period):
-        raise ModelError(
-            f"the period of the right-hand side near {guess:.6g} is not found: give period=, a number or a "
-            "function of the parameters"
-        )
+        raise ModelError(f"the period of the right-hand side near {guess:.6g} is not found: {_GIVE_PERIOD}")
     return period
 
 
@@ -221,6 +233,23 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
                 pass
         before = [before[1], value]
     return None
+
+
+def common_period(motions: Motions, ticks: float) -> float:
+    """Return the least multiple of the period of a clock after which the right-hand side is the same.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    for multiple in range(1, _MOST_MULTIPLES + 1):
+        if _repeats(motions, multiple * ticks):
+            return multiple * ticks
+    raise ModelError(
+        f"things happen every {ticks:.6g} units of time, and the right-hand side does not repeat itself in "
+        f"{_MOST_MULTIPLES} of them: {_GIVE_PERIOD}"
+    )
 
 
 def _difference_from_start(motions: Motions, period: float) -> Array:

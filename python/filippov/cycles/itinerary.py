@@ -109,32 +109,37 @@ def _signature(leg: Leg) -> tuple[object, ...]:
     return (leg.mode, None if ending is None else (ending.guard, ending.acts))
 
 
-def itinerary_of(record: Record, t1: float) -> Itinerary:
-    """Return the itinerary of a run from its start to the time `t1`.
+def itinerary_of(record: Record, t0: float, t1: float) -> Itinerary:
+    """Return the itinerary of a run between two times; the run lasts a little longer.
+
+    If something happens at the last time because it is that time, the cycle starts behind it.
 
     Raises
     ------
     ModelError
         If it has infinitely many switches, or too many.
     """
-    start = _start_of(record)
-    return _between(
-        start, [instant for instant in _changes(record) if start.times[1] < instant.times[0] < t1], t1
-    )
+    rounding = 1e-9 * (t1 - t0)
+    all_changes = _changes(record)
+    earlier = [instant for instant in all_changes if instant.times[0] <= t0 + rounding]
+    start = _place_in(record, earlier, t0)
+    found = [instant for instant in all_changes if t0 + rounding < instant.times[0] < t1 + rounding]
+    if found and not found[-1].guards and found[-1].times[0] > t1 - rounding:
+        return _between(start, found, None)
+    return _between(start, [instant for instant in found if instant.times[0] < t1], t1)
 
 
 def itinerary_from_event(record: Record, period: float, at: float | None = None) -> Itinerary | None:
-    """Return the itinerary of a period that starts at an event: at a time, or else before the longest leg.
+    """Return the itinerary of a period that starts at an event: at a time, or before the longest leg.
 
-    The run lasts for two periods at least. ``None`` if there is no such event that comes again a period later.
+    The run lasts for two periods at least. ``None`` if no such event comes again a period later.
 
     Raises
     ------
     ModelError
         If it has infinitely many switches, or too many.
     """
-    start, instants = _start_of(record), _changes(record)
-    first = start.times[1]
+    instants, first = _changes(record), float(record.solution.t[0])
     best: tuple[float, Itinerary] | None = None
     for i, instant in enumerate(instants[:-1]):
         t = instant.times[1]
@@ -167,13 +172,17 @@ def _changes(record: Record) -> list[Instant]:
     return found
 
 
-def _start_of(record: Record) -> Instant:
-    """Return the start of a run as an instant."""
-    solution = record.solution
-    x, t = solution.y[:, 0].copy(), float(solution.t[0])
-    start = Instant((t, t), (x, x), (record.mode, record.mode), (record.discrete, record.discrete), (), ())
-    at_start = [instant for instant in record.instants if instant.times[0] == t and instant.changes()]
-    return at_start[-1] if at_start else start
+def _place_in(record: Record, earlier: Sequence[Instant], t: float) -> Instant:
+    """Return a place of a run as an instant at which nothing happens, or the one that is there."""
+    if earlier and abs(earlier[-1].times[0] - t) <= 1e-9 * abs(t - record.solution.t[0]):
+        return earlier[-1]
+    if earlier and earlier[-1].times[0] == t:
+        return earlier[-1]
+    mode = earlier[-1].modes[1] if earlier else record.mode
+    q = earlier[-1].discrete[1] if earlier else record.discrete
+    assert record.solution.sol is not None
+    x = record.solution.sol(max(t, float(record.solution.t[0])))
+    return Instant((t, t), (x, x), (mode, mode), (q, q), (), ())
 
 
 def _nearest(instants: Sequence[Instant], instant: Instant, t: float) -> int | None:

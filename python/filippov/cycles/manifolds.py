@@ -17,8 +17,8 @@ import numpy as np
 
 from filippov.backward import reversed_source
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium
 from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium
 from filippov.cycles.return_map import ReturnMap, Stuck
 from filippov.errors import InputError
 from filippov.scalars import positive
@@ -33,7 +33,7 @@ _START = 1e-6
 _PER_STEP, _MOST_RUNS, _LONGER = 16, 40, 1.5
 # A run that moves by less than this share of the length wanted is at rest.
 _AT_REST = 1e-7
-# Points of the first segment; the largest gap in units of the length; how many points are too many.
+# Points of the first segment; the largest gap, in units of the size; how many points are too many.
 _FIRST_POINTS, _GAP, _MOST_POINTS = 16, 0.01, 4000
 
 
@@ -296,6 +296,7 @@ def _images(returns: ReturnMap, multiplier: float, vector: Array, length: float,
     turns = 1 if multiplier > 0.0 else 2  # with a negative multiplier two returns come back to the side
     growth = abs(multiplier) ** turns
     size = max(float(np.max(np.abs(returns.point))), 1e-2 * length)
+    largest = _GAP * min(length, 2.0 * size)
     orbits: dict[float, list[Array]] = {}
 
     def image(s: float, k: int) -> Array:
@@ -319,7 +320,7 @@ def _images(returns: ReturnMap, multiplier: float, vector: Array, length: float,
                 return _finished(side, points, done, str(error))
             gap = float(np.linalg.norm(here - points[-1]))
             before = seeds[i - 1] if i else seeds[-1] - 1.0
-            if gap > _GAP * length and k > 0:
+            if gap > largest and k > 0:
                 width = seeds[i] - before
                 if len(points) > _MOST_POINTS or len(orbits) > _MOST_POINTS:
                     return _finished(side, points, done, f"it needs more than {_MOST_POINTS} points")

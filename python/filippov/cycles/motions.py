@@ -171,14 +171,14 @@ class Motions:
         """Take these values of the parameters."""
         values = self.system.parameter_values(params)
         prepared = self.system.prepare(self.n, 0.0, None, values)
-        refuse_without_derivatives(prepared, self.system.discrete, (0.0, 1.0))
+        refuse_without_derivatives(prepared, (0.0, 1.0))
         assert isinstance(prepared.core, TracedSystem)
         self._params, self._prepared, self._core = values, prepared, prepared.core
         self._held = None
 
-    def move(self, values: Sequence[float]) -> None:
+    def move(self, values: Array) -> None:
         """Take other values of the parameters by which derivatives are taken."""
-        moved = {**self._params, **dict(zip(self._by, map(float, values), strict=True))}
+        moved = {**self._params, **dict(zip(self._by, values.tolist(), strict=True))}
         if moved == self._params:
             return
         if self._prepared.pinned is not None:
@@ -257,7 +257,7 @@ class Motions:
         instants = [
             Instant(
                 (t[0], t[1]),
-                (states[0], states[1]),
+                (states[0][: self.n], states[1][: self.n]),
                 (tuple(modes[0]), tuple(modes[1])),
                 (tuple(discrete[0]), tuple(discrete[1])),
                 tuple(guards),

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from filippov.arrays import finite_array
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, first_multipliers, rest_of
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.motions import Array, Motions
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, first_multipliers, rest_of
 from filippov.cycles.streamlines import Streamline, streamlines
 from filippov.errors import FilippovError, InputError, ModelError
 from filippov.events import Event

@@ -1,8 +1,8 @@
 """Test functions of a cycle with a given itinerary: positive while the flow follows it.
 
 Each is a smooth function of the equations of the itinerary, which goes on where the flow takes another way.
-References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and 8; Kuznetsov, Rinaldi,
-Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and
+8; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
 """
 
 from __future__ import annotations
@@ -149,7 +149,8 @@ def _triggers(motions: Motions, surface: int) -> bool:
 
 def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage) -> list[Probe]:
     """Return what must hold where a leg ends."""
-    assert leg.ending is not None and leg.ending.guard is not None
+    assert leg.ending is not None
+    assert leg.ending.guard is not None
     guard, t = leg.ending.guard, passage.t
     kind, surface, _ = guard
     own = motions.at(leg.mode, leg.discrete, t, passage.leg.x)
@@ -181,7 +182,7 @@ def _is_crossed(before: Mode, after: Mode, surface: int) -> bool:
 def local_probe(
     shooting: Shooting, key: tuple[Any, ...], x: Array, t0: float, duration: float, share: float
 ) -> tuple[float, float, float]:
-    """Return one test function from the start of its leg alone, with the next derivative in time of what vanishes.
+    """Return one test function from the start of its leg alone, and the next derivative of what vanishes.
 
     Parameters
     ----------

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from filippov.cycles.branch import Branch, Point, Special, State
-from filippov.cycles.continuation import at_value
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve
+from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
 from filippov.cycles.motions import Motions
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.cycles.shooting import Period, Shooting
 from filippov.errors import InputError
 from filippov.system import System
@@ -88,7 +88,9 @@ def load_branch(
     if not is_known:
         raise InputError(f"{path}: the file has no branch")
     if data["version"] > _VERSION:
-        raise InputError(f"{path}: the file is of version {data['version']}, this program reads up to {_VERSION}")
+        raise InputError(
+            f"{path}: the file is of version {data['version']}, this program reads up to {_VERSION}"
+        )
     build = _Builder(data, system, period)
     points = [
         Point(row["params"], build.state(row), {tuple(_tupled(key)): value for key, value in row["tests"]})
@@ -158,7 +160,9 @@ class _Builder:
     def __init__(self, data: Mapping[str, Any], system: System, period: Any) -> None:
         self._params, self._system, self._period = data["params"], system, period
         first = data["points"][0]
-        self._n = len(first["starts"][0]) if data["kind"] == "cycles" else len(first["w"]) - first["mode"].count(0)
+        self._n = (
+            len(first["starts"][0]) if data["kind"] == "cycles" else len(first["w"]) - first["mode"].count(0)
+        )
 
     def state(self, row: Mapping[str, Any]) -> State:
         """Return the state of a row."""

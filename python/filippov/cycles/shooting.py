@@ -1,10 +1,11 @@
 """The equations of a cycle with a given itinerary, and their derivatives.
 
-The unknowns are the states at the starts of the legs, their durations, the time at which the first starts, if that is not known, and
-parameters. Each leg is followed in its mode for its duration, whatever its guards do in between: a cycle can be continued beyond the
-end of its itinerary, where a piece no longer ends at what ends it in the flow.
+The unknowns are the states at the starts of the legs, their durations, the time at which the first starts,
+if that is not known, and parameters. Each leg is followed in its mode for its duration, whatever its guards
+do in between: a cycle can be continued beyond the end of its itinerary, where a piece no longer ends at what
+ends it in the flow.
 
-References: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems); `docs/theory`.
+Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems).
 """
 
 from __future__ import annotations
@@ -72,7 +73,14 @@ class Shot(NamedTuple):
     times: list[Array]
 
     def monodromy(self) -> Array:
-        """Return the derivative of the state after one period by the state at the start, at fixed times."""
+        """Return the derivative of the state after one period by the state at the start, at fixed times.
+
+        It is infinite where a leg ends without speed.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self._monodromy()
+
+    def _monodromy(self) -> Array:
         n = len(self.passages[0].after)
         states, time = np.eye(n), np.zeros(n)
         for passage in self.passages:
@@ -81,8 +89,7 @@ class Shot(NamedTuple):
             if passage.row is None:
                 return np.asarray(states)
             rate = passage.row[0] + passage.row[1 : 1 + n] @ at_end
-            with np.errstate(divide="ignore", invalid="ignore"):
-                time = -(passage.row[1 : 1 + n] @ states) / rate
+            time = -(passage.row[1 : 1 + n] @ states) / rate
             states = states + np.outer(at_end, time)
             states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
         return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))

@@ -14,9 +14,9 @@ from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import Special, State
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import Equilibrium
 from filippov.cycles.itinerary import itinerary_from_event
 from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium
 from filippov.cycles.shooting import Shooting
 from filippov.errors import InputError, ModelError
 
@@ -54,9 +54,9 @@ def _doubled(cycle: Cycle) -> Cycle:
     shooting = own._shooting
     motions, period = shooting.motions, shooting.period
     if period is not None:
-        period = period.near(cycle.period)
-        period = type(period)(*_twice(period))
-    record = motions.record((own.t0, own.t0 + 4.2 * own.period), own.y0)
+        period = period.twice()
+    t, x = own.inside()
+    record = motions.record((t, t + 4.2 * own.period), x)
     itinerary = itinerary_from_event(record, 2 * own.period)
     if itinerary is None:
         raise ModelError("the cycle has no switch from which its double could start")
@@ -65,17 +65,8 @@ def _doubled(cycle: Cycle) -> Cycle:
     return Cycle(doubled, u, doubled.shoot(u), 0.0)
 
 
-def _twice(period: object) -> tuple[object, ...]:
-    from filippov.cycles.forcing import GivenPeriod, InferredPeriod
-
-    if isinstance(period, InferredPeriod):
-        return period.guess, 2 * period.multiple, period.exponents
-    assert isinstance(period, GivenPeriod)
-    return period.phase.period, 2 * period.multiple
-
-
 def _beside(curve: CycleCurve, code: str) -> State:
-    """Return a cycle beside the branch through the start of a curve, along the other direction of its kernel."""
+    """Return a cycle beside the start of a curve, along the other direction of the kernel there."""
     w = curve.start
     scale = curve.scales(w)
     _, jacobian = curve.equations(w)

@@ -14,6 +14,7 @@ from filippov.plot.surface import surface
 
 if TYPE_CHECKING:
     from filippov.cycles.cycle import Cycle
+    from filippov.cycles.manifolds import ManifoldCurve
     from filippov.cycles.portrait import Portrait
     from filippov.solution import Solution
     from filippov.system import System
@@ -32,6 +33,7 @@ def portrait(
     ax: Any = None,
     *,
     cycles: Sequence[Cycle] = (),
+    manifolds: Sequence[ManifoldCurve] = (),
     dark: bool | None = None,
     legend: bool = True,
     **options: Any,
@@ -42,7 +44,7 @@ def portrait(
     attracts, dashed where it repels, and dotted where trajectories cross it; arrows on it show the direction
     of sliding. Triangles are tangencies, filled if they are visible, and point to the side of the tangent
     field. Circles are equilibria and squares pseudo-equilibria, filled if they are stable. Coloured lines are
-    trajectories and cycles.
+    trajectories, cycles and manifolds.
 
     Parameters
     ----------
@@ -56,6 +58,8 @@ def portrait(
         Where to draw; a new figure by default.
     cycles : sequence of Cycle, optional
         Cycles to draw.
+    manifolds : sequence of ManifoldCurve, optional
+        Curves that `fl.manifold` found, to draw.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
     legend : bool, optional
@@ -100,6 +104,8 @@ def portrait(
         surface(parts, ax, dark, legend)
     runs = [cycle.solution for cycle in found.cycles]
     _draw_trajectories(ax, runs, chosen.colours[5], _CYCLE_WIDTH, "cycle", 2.2)
+    for curve in manifolds:
+        ax.plot(*curve.points, color=chosen.colours[3], linewidth=1.5, zorder=2.1, label="manifold")
     _draw_sliding(ax, found, chosen)
     handles = _draw_tangencies(ax, found, chosen)
     handles += _draw_equilibria(ax, found, chosen)
@@ -243,7 +249,7 @@ def _named(ax: Any, handles: Sequence[Any]) -> list[Any]:
     """Return the entries of the legend: those of surfaces and lines, then of the signs, each once."""
     known = ax.get_legend()
     found = list(known.legend_handles) if known is not None else []
-    for label in ("trajectory", "cycle"):
+    for label in ("trajectory", "cycle", "manifold"):
         found += [line for line in ax.lines if line.get_label() == label][:1]
     texts = {handle.get_label() for handle in found}
     for handle in handles:

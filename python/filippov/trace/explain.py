@@ -36,8 +36,8 @@ BLACK_BOX = (
 )
 CLOCKS = "rounding towards zero is not traced; write np.floor, np.ceil, np.rint, np.mod or fl.sawtooth(t, T)"
 ZEROS = (
-    "make the array with np.zeros_like(x) (or np.zeros(n, dtype=object)), so that it can hold traced values, "
-    "or return a list; np.zeros(n) and np.empty(n) hold only plain numbers"
+    "make the array with np.zeros(n), np.empty(n) or np.zeros_like(x), or return a list: an array of another "
+    "type, or one that is made otherwise, holds plain numbers only"
 )
 MASK = "write np.where(mask, a, b) instead of selecting elements by a condition"
 TABLE = "a table lookup cannot be traced: write the pieces with np.where, np.select or np.piecewise"

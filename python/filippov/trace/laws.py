@@ -76,6 +76,13 @@ class Laws:
     ----------
     first : int
         Index of the first discrete state among the parameters.
+
+    Attributes
+    ----------
+    kept : set of int
+        Laws that functions beside the field read.
+    idle : frozenset of int
+        Laws that a run does not follow, since nothing reads them.
     """
 
     def __init__(self, first: int) -> None:
@@ -90,6 +97,28 @@ class Laws:
         self._entries: dict[int, tuple[int, _Law]] = {}
         self._values: list[str] = []
         self._is_complete = False
+        self.kept: set[int] = set()
+        self.idle: frozenset[int] = frozenset()
+
+    def copy(self) -> Laws:
+        """Return laws that begin as these, and to which others can be added."""
+        new = Laws(self.first)
+        new.names, new._laws, new._values = [*self.names], [*self._laws], [*self._values]
+        new.named, new._known, new._entries = {**self.named}, {**self._known}, {**self._entries}
+        new.sticking = {**self.sticking}
+        return new
+
+    def adopt(self, tracer: Tracer, other: Tracer) -> None:
+        """Add the laws that a function beside the field found with a copy of these; keep those it reads."""
+        found = other.laws
+        for index in range(len(self._laws), len(found._laws)):
+            law = found._laws[index]
+            nodes = [tracer.builder.adopted(other.builder, node) for node in law.nodes]
+            if any(node is None for node in nodes):
+                break  # those behind it may read it
+            kept = tuple(node for node in nodes if node is not None)
+            self._state(tracer, law._replace(nodes=kept), found.names[index])
+        self.kept |= {index for index in other.laws_read if index < len(self._laws)}
 
     def name(self, tracer: Tracer, name: str, initial: int) -> None:
         """Add a discrete state that begins as an expression and that resets set; before all other laws."""

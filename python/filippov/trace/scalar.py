@@ -47,7 +47,11 @@ class Scalar:
         return repr(self)
 
     def __hash__(self) -> int:
-        return hash((id(self.tracer), self.node))
+        raise NotTraceable(
+            "a traced value as the key of a dict, or as an entry of a set",
+            "make a list or an array of the values outside of the function and index that, `values[int(t)]`; "
+            "or choose with np.where or np.select",
+        )
 
     # ------------------------------------------------------------------ NumPy
 

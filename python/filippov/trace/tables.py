@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from filippov.errors import ModelError
 from filippov.trace.explain import NotTraceable, calling_line
-from filippov.trace.pieces import by_parts, has_constant_part
+from filippov.trace.pieces import Pieces, by_parts, has_constant_part
 from filippov.trace.ufuncs import choose
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def polynomial(tracer: Tracer, node: int, table: Table) -> int:
     if _stands_still_or_ticks(tracer, node):
         return _value(tracer, node, table)
     pieces = tracer.pieces(node, in_full=True)
-    if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
+    if pieces is not None and _has_own_parts(tracer, node, pieces):
         return by_parts(tracer, pieces, lambda part, _: polynomial(tracer, part, table))
     jumps = table.jumps()
     if len(jumps) > MOST_JUMPS:
@@ -160,7 +160,7 @@ def count(tracer: Tracer, node: int, knots: Vector, *, strictly: bool = False) -
     if _stands_still_or_ticks(tracer, node):
         return tracer.laws.place(tracer, node, tuple(knots.tolist()))
     pieces = tracer.pieces(node, in_full=True)
-    if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
+    if pieces is not None and _has_own_parts(tracer, node, pieces):
         return by_parts(tracer, pieces, lambda part, _: count(tracer, part, knots))
     # Nearest to the knot k the expression is behind k knots, or k + 1: a jump of an ordinary surface.
     middles = 0.5 * (knots[1:] + knots[:-1])
@@ -237,6 +237,14 @@ def _stands_still_or_ticks(tracer: Tracer, node: int) -> bool:
     laws = tracer.laws
     still = not tracer.builder.depends_on_motion(node) or tracer.is_constant_of_motion(node)
     return still or laws.is_clock(tracer, node)
+
+
+def _has_own_parts(tracer: Tracer, node: int, pieces: Pieces) -> bool:
+    """Whether each part of an expression has a place of its own in a table.
+
+    A place follows what moves continuously. That of an event follows what is smooth: no mode reads it.
+    """
+    return not tracer.may_slide or has_constant_part(tracer, pieces) or tracer.jumps(node)
 
 
 def _known_place(tracer: Tracer, node: int, known: float, knots: Vector) -> int:

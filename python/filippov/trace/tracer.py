@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from dataclasses import field as member
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -24,12 +25,13 @@ from filippov.trace.verify import verify, verify_event
 if TYPE_CHECKING:
     from filippov._core import Builder, TracedEvent, TracedSystem
     from filippov.trace.explain import UserLine
+    from filippov.trace.laws import Laws
     from filippov.trace.stand_ins import StandIns
 
 __all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
 
-# What a warning says of an event with a law that the field has not.
-OWN_LAW = "a floor, a relay or a table of its own"
+# What a warning says of an event or a section with a law that the run does not follow.
+OWN_LAW = "a floor, a relay or a table that the run does not follow"
 
 Vector = NDArray[np.float64]
 _T = TypeVar("_T")
@@ -109,6 +111,7 @@ def trace(
     discrete: Sequence[str] = (),
     is_field: bool = True,
     root_ends: bool = False,
+    beside: Sequence[Callable[..., Any]] = (),
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
 
@@ -144,6 +147,8 @@ def trace(
         Whether the function is the rate of the state; it has constants of motion then.
     root_ends : bool, optional
         Whether square roots and fractional powers are zero beyond their end, which is a surface then.
+    beside : sequence of callables, optional
+        Events ``g(t, x, *args)``: the system has their laws too, so that they can be traced beside it.
 
     Returns
     -------
@@ -176,6 +181,8 @@ def trace(
         if is_field:
             field = tracer.with_ends_of_roots(field, root_ends)
         watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
+        for g in beside:
+            _adopt_laws(tracer, field, g, args)
         order = tracer.laws.complete(tracer, [*declared, *(surface for surface, _ in watched)])
         new = tuple((order[surface], orientation) for surface, orientation in watched)
         return tuple(order[surface] for surface in declared), field, new
@@ -204,6 +211,7 @@ def trace(
     again = _Again(lambda: new_tracer(tracer.constants, tracer.stand_ins), record)
     doubts = check_questions(tracer, roots, "fun", again)
     system = _system(tracer, field, [index for index, _ in watched])
+    tracer.laws.idle = frozenset(system.idle_laws())
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
     return Trace(
@@ -252,7 +260,7 @@ def trace_event(
         The event. If `g` must be called as a Python function: what it has that was not traced, for a
         warning, or an empty text if it cannot be traced at all.
     """
-    found = _beside(traced, g, args, t0, y0, parameters)
+    found = _beside(traced, g, args, t0, y0, parameters, is_event=True)
     return found if isinstance(found, str) else found[0]
 
 
@@ -304,32 +312,29 @@ def _beside(
     t0: float | None,
     y0: NDArray[Any] | None,
     parameters: Mapping[str, float] | None,
+    *,
+    is_event: bool = False,
 ) -> tuple[TracedEvent, Tracer, int] | str:
-    """Trace a function beside a trace; the event, its tracer and its node, or what kept it from that."""
+    """Trace a function beside a trace; the event, its tracer and its node, or what kept it from that.
+
+    An event reads the discrete states that the run follows. Other functions are evaluated at points, where
+    those that the run does not follow are found anew.
+    """
     from filippov._core import TracedEvent
 
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
 
     def attempt(stand_ins: StandIns | None) -> tuple[Tracer, int]:
-        tracer = Tracer(
-            traced.builder.copy(),
-            own.t0 if t0 is None else t0,
-            own.y0 if y0 is None else y0,
-            parameters=dict(values),
-            states=own.states,
-            max_paths=own.max_paths,
-            laws=own.laws,
-            constants=ConstantsOfMotion(traced.builder, traced.field),
-            stand_ins=stand_ins,
-            may_slide=False,
+        tracer = _tracer_beside(
+            own, traced.builder, traced.field, own.laws, stand_ins, t0=t0, y0=y0, parameters=values
         )
         return tracer, _explore(tracer, g, args, "event", None)[0]
 
     try:
         tracer, node = _with_stand_ins(attempt)
         builder = tracer.builder
-        if own.laws.may_be_idle(tracer):
+        if own.laws.may_be_idle(tracer) or (is_event and tracer.laws_read & own.laws.idle):
             return OWN_LAW
         check_questions(tracer, Roots([node]), "event")
         event = TracedEvent(builder, node, list(tracer.own_levels), len(tracer.names()))
@@ -421,6 +426,7 @@ def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> Tr
         laws.rows,
         laws.n_guards,
         list(laws.sticking.items()),
+        sorted(laws.kept),
     )
 
 
@@ -429,6 +435,45 @@ def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...],
     if tracer.builder.as_constant(node) is not None:
         raise ModelError(f"{role} is constant: a switching function must depend on t or x")
     return tracer.builder.declare_surface(node)
+
+
+def _adopt_laws(tracer: Tracer, field: list[int], g: Callable[..., Any], args: tuple[Any, ...]) -> None:
+    """Add the laws of an event to a trace that is not complete; none if the event cannot be traced."""
+
+    def attempt(stand_ins: StandIns | None) -> Tracer:
+        own = _tracer_beside(tracer, tracer.builder, field, tracer.laws.copy(), stand_ins)
+        _explore(own, g, args, "event", None)
+        return own
+
+    with suppress(TraceError, ModelError):
+        tracer.laws.adopt(tracer, _with_stand_ins(attempt))
+
+
+def _tracer_beside(
+    own: Tracer,
+    builder: Builder,
+    field: list[int],
+    laws: Laws,
+    stand_ins: StandIns | None,
+    *,
+    t0: float | None = None,
+    y0: NDArray[Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Tracer:
+    """Return a tracer for a function beside a field, which adds nothing to the builder of the field."""
+    values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
+    return Tracer(
+        builder.copy(),
+        own.t0 if t0 is None else t0,
+        own.y0 if y0 is None else y0,
+        parameters=dict(values),
+        states=own.states,
+        max_paths=own.max_paths,
+        laws=laws,
+        constants=ConstantsOfMotion(builder, field),
+        stand_ins=stand_ins,
+        may_slide=False,
+    )
 
 
 def _watch(tracer: Tracer, h: Callable[..., Any], args: tuple[Any, ...], role: str) -> tuple[int, float]:

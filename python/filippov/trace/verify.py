@@ -114,7 +114,7 @@ def _difference(
     if signs is None:
         return None
     traced = system.field(t, x, signs, values)
-    if _is_decided_by_nan(system, t, x, signs, values, traced):
+    if len(signs) and _is_decided_by_nan(system, t, x, signs, values, traced):
         return None
     own = _evaluate(fun, t, x)
     if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
@@ -129,7 +129,8 @@ def _is_decided_by_nan(
     system: TracedSystem, t: float, x: Vector, signs: Vector, values: Vector, traced: Vector
 ) -> bool:
     """Whether the field depends on the sign of a function that is not a number at the point."""
-    for surface in np.flatnonzero(np.isnan(system.surface_values(t, x, signs, values))):
+    h = system.surface_values(t, x, signs, values).tolist()
+    for surface in [surface for surface, value in enumerate(h) if value != value]:
         other = signs.copy()
         other[surface] *= -1.0
         if not np.array_equal(system.field(t, x, other, values), traced, equal_nan=True):
@@ -148,11 +149,10 @@ def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) 
     for _ in range(system.n_surfaces + 1):
         h = system.surface_values(t, x, signs, values)
         # NaN beyond the domain of an inactive surface: either sign will do.
-        new = np.where(h < 0.0, -1.0, 1.0)
-        if (new == signs).all():
+        if not (h * signs < 0.0).any():
             tiny = 1e-13 * (1.0 + float(np.abs(x).max(initial=0.0)))
             return None if bool((np.abs(h) <= tiny).any()) else signs
-        signs = new
+        signs = np.where(h < 0.0, -1.0, 1.0)
     return None
 
 

@@ -26,7 +26,8 @@ pub(crate) fn quiet_change(run: &Run, due: &[usize]) -> Result<Option<Vec<f64>>,
     if !is_region || !all.all(|index| is_quiet(&index)) {
         return Ok(None);
     }
-    let (mut x, mut q) = (run.x.clone(), motion.discrete.clone());
+    let mut x: SmallVec<[f64; 8]> = SmallVec::from_slice(&run.x);
+    let mut q = motion.discrete.clone();
     for index in due.iter().copied().chain(actions.after_jumps()) {
         let map = actions.list[index].map;
         map.apply(t, &mut x, &motion.signs, &mut q)?;

@@ -33,19 +33,42 @@ pub(crate) fn place(
         return Ok(Decision::by(Rule::Region, Err(Stop::NotFinite)));
     };
     // What only a law of the system sees has the side that is known: its action has been done, or will be.
-    let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
-    let (smooth, zeros): (Vec<usize>, Vec<usize>) =
-        zeros.partition(|&j| at.triggers().is_only_trigger(j));
+    let zeros = (0..on_surface.len()).filter(|&j| on_surface[j]);
+    let (internal, zeros): (Vec<usize>, Vec<usize>) =
+        zeros.partition(|&j| at.triggers().is_internal(j));
+    let (smooth, zeros): (Vec<usize>, Vec<usize>) = zeros
+        .into_iter()
+        .partition(|&j| at.triggers().is_only_trigger(j));
     let switching = zeros.iter().copied().filter(|&j| at.system.switches_at(j));
     let meeting = surfaces_that_matter(at.system, &mode, switching.collect());
     if !smooth.is_empty() {
-        return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
+        let placed = place_on_triggers(at, notes, mode, &smooth, meeting, memory)?;
+        return leave_internal(at, placed, &internal);
     }
     let Decision { rule, decided } = place_on(at, notes, &mode, &meeting, memory)?;
     let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
     let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
     let decided = take_sides(at, decided, inactive.filter(is_new))?;
-    Ok(Decision::by(rule, decided))
+    leave_internal(at, Decision::by(rule, decided), &internal)
+}
+
+/// Adds the surfaces of laws that the motion leaves at a multiple zero, as it does where a table begins to be read at rest on one
+/// of its knots.
+fn leave_internal(
+    at: &Point,
+    mut decision: Decision,
+    internal: &[usize],
+) -> Result<Decision, FieldError> {
+    if let Ok(next) = &mut decision.decided {
+        for &j in internal {
+            let (side, signs) = (next.mode.entries()[j], next.mode.signs());
+            let leading = first_nonzero(at.system, j, side, 0, &at.place(&signs))?;
+            if leading.order > 1 && leading.sign() == side {
+                next.left.push(Left::beside(j, leading));
+            }
+        }
+    }
+    Ok(decision)
 }
 
 /// Gives surfaces that do not matter the sides that a motion in a region moves to.

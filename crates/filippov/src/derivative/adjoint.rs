@@ -5,7 +5,9 @@
 //! steps are taken back by the transpose of the equations that carry changes forward, so that the product of w with a change is the
 //! same at all times, to rounding.
 
-use super::between::EventGradient;
+use super::between::{state_at, EventGradient};
+use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
 use super::instant::{arrival, Instant, Passage, Weights};
@@ -13,7 +15,6 @@ use super::limit::{is_like, Shares};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, Solution};
 use crate::system::{Actions, TracedSystem};
@@ -26,6 +27,8 @@ pub struct Trail {
     /// The ends of the steps, and how many instants were before.
     steps: Vec<(f64, usize)>,
     instants: Vec<KeptInstant>,
+    /// So many discrete states are states here.
+    n_named: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -48,10 +51,18 @@ impl Trail {
         self.instants.iter().map(KeptInstant::record)
     }
 
+    /// Of a run of an extended system.
+    pub fn of(extended: &Extended) -> Self {
+        Trail {
+            n_named: extended.n_named,
+            ..Trail::default()
+        }
+    }
+
     fn begin(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) {
         self.start.get_or_insert_with(|| Start {
             t,
-            x: x.to_vec(),
+            x: [x, &q[..self.n_named]].concat(),
             mode: mode.clone(),
             q: q.to_vec(),
         });
@@ -70,7 +81,8 @@ impl Observer for Trail {
 
     fn instant(&mut self, record: &InstantRecord) {
         self.begin(record.t[0], record.x[0], record.mode[0], record.discrete[0]);
-        self.instants.push(KeptInstant::of(record));
+        let kept = KeptInstant::with_discrete_as_states(record, self.n_named);
+        self.instants.push(kept);
     }
 }
 
@@ -103,8 +115,8 @@ pub struct CostGradient {
     by_start: f64,
     /// The time of an instant at which there is no derivative: the gradient is NaN.
     pub lost: Option<(f64, &'static str)>,
-    /// Surfaces on which the run starts and that it leaves, where the field jumps: the gradient is that of one side.
-    pub starts_on: Vec<usize>,
+    /// Where it is that of one side.
+    pub borders: Borders,
 }
 
 impl CostGradient {
@@ -142,6 +154,7 @@ struct Walk<'w> {
     terms: Vec<(f64, &'w Term<'w>)>,
     /// What the limits of infinitely many switches owe to earlier instants.
     owed: Vec<Shares>,
+    borders: Borders,
 }
 
 impl WayBack<'_> {
@@ -164,6 +177,7 @@ impl WayBack<'_> {
             w: vec![0.0; n + m],
             terms: timed,
             owed: Vec::new(),
+            borders: Borders::default(),
         };
         let impacts = extended.impacts();
         let lost = walk.back(terms, &impacts)?;
@@ -172,7 +186,7 @@ impl WayBack<'_> {
             by_state: walk.w,
             by_start: f64::NAN,
             lost,
-            starts_on: Vec::new(),
+            borders: walk.borders,
         };
         if found.lost.is_some() {
             found.by_state.fill(f64::NAN);
@@ -182,19 +196,18 @@ impl WayBack<'_> {
             around.take_sides(&start.mode);
             let mut piece = Piece::new(&around, &start.mode, &start.q);
             let z = extended.state(&start.x);
-            let mut field = vec![0.0; n + m];
-            piece
-                .field
-                .eval_unprojected(start.t, &mut z.clone(), &mut field)?;
-            let mut columns = extended.columns_at_start(self.kinds, &field);
+            let field = piece.rates(start.t, &z)?;
+            let columns = extended.columns_at_start(self.kinds, &field);
             if let Some(arrival) = arrival(&piece, start.t, &z)? {
-                columns.iter_mut().for_each(|c| arrival.apply(n, c));
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 arrival.pull_back(n, &mut whole);
                 found.by_parameters = whole.split_off(n);
                 found.by_state = whole;
             }
-            found.starts_on = piece.left_at_once(start.t, &z, self.kinds, &columns)?;
+            let borders = &mut found.borders;
+            let at = (start.t, &z[..]);
+            borders.starts_on = surfaces_at_start(&mut piece, at, self.kinds, &columns)?;
+            borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, self.kinds)?;
             found.by_start = -dot(&found.by_state, &field);
         }
         Ok(found)
@@ -219,7 +232,12 @@ impl<'w> Walk<'w> {
             (record.mode[1], record.discrete[1])
         });
         let mut piece = Piece::new(&pieces[trail.instants.len()], mode, q);
-        let end = (self.run.solution.t_last, self.run.solution.last_state());
+        let x = self
+            .run
+            .systems
+            .1
+            .with_named(self.run.solution.last_state(), q);
+        let end = (self.run.solution.t_last, &x[..]);
         for term in terms {
             if let When::End(zero) = term.at {
                 self.add_term(&mut piece, (term.cost, zero), end)?;
@@ -279,11 +297,7 @@ impl<'w> Walk<'w> {
             let path = |t: f64, x: &mut [f64]| {
                 // The continuous extension of this step, also at its end.
                 let side = if t >= end { Side::Left } else { Side::Right };
-                let mode = run.solution.evaluate(run.systems.0, t, side, x)?;
-                if mode.is_none() {
-                    x.fill(f64::NAN);
-                }
-                Ok(())
+                state_at(run.solution, run.systems, (t, side), x)
             };
             let mut x = vec![0.0; run.systems.1.n];
             path(at, &mut x)?;
@@ -302,9 +316,9 @@ impl<'w> Walk<'w> {
     /// Adds the terms at a time and later, of the motion before.
     fn terms_at(&mut self, piece: &mut Piece, t: f64) -> Result<(), FieldError> {
         while let Some((at, term)) = self.terms.pop_if(|term| term.0 >= t) {
-            let (system, extended) = self.run.systems;
-            let mut x = vec![0.0; extended.n];
-            self.run.solution.evaluate(system, at, Side::Left, &mut x)?;
+            let run = self.run;
+            let mut x = vec![0.0; run.systems.1.n];
+            state_at(run.solution, run.systems, (at, Side::Left), &mut x)?;
             let zero = match term.at {
                 When::Zero(_, function) => Some(function),
                 _ => None,
@@ -326,9 +340,7 @@ impl<'w> Walk<'w> {
         let (by_time, gradient) = cost.at(t, &z, &piece.q)?;
         add(&mut self.w, 1.0, &gradient);
         if let Some(function) = zero {
-            let mut field = vec![0.0; z.len()];
-            let mut point = z.clone();
-            piece.field.eval_unprojected(t, &mut point, &mut field)?;
+            let field = piece.rates(t, &z)?;
             let (time, normal) = function.at(t, &z, &piece.q)?;
             let rate = time + dot(&normal, &field);
             let moved = by_time + dot(&gradient[..extended.n], &field);
@@ -369,11 +381,7 @@ impl<'w> Walk<'w> {
             }
         } else {
             match instant.through(&weights, &mut 0.0)? {
-                Ok(Passage { time, changes, .. }) => {
-                    let changes = changes.iter().rev();
-                    changes.for_each(|change| change.pull_back(n, &mut self.w));
-                    time
-                }
+                Ok(passages) => self.pull_back(record, &passages, n),
                 Err(lost) => return Ok(Some(lost.name())),
             }
         };
@@ -409,6 +417,31 @@ impl<'w> Walk<'w> {
         }
         let is_finite = self.w.iter().all(|value| value.is_finite());
         Ok((!is_finite).then_some("not_finite"))
+    }
+
+    /// Takes the gradient back through what happens at an instant; returns the derivative of the time of the guard.
+    fn pull_back(&mut self, record: &InstantRecord, passages: &[Passage], n: usize) -> Row {
+        let after = self.w.clone();
+        let mut is_timed = false;
+        for passage in passages.iter().rev() {
+            for change in passage.changes.iter().rev() {
+                change.pull_back(n, &mut self.w);
+            }
+            is_timed |= passage.time.iter().any(|entry| *entry != 0.0);
+        }
+        if is_timed && record.t[1] == self.run.solution.t_last {
+            self.borders.ends_at_instant |= differ(&after, &self.w);
+        }
+        let start = self
+            .run
+            .trail
+            .start
+            .as_ref()
+            .map_or(record.t[0], |start| start.t);
+        self.borders.starts_at_action |=
+            is_missed_later(self.run.systems.1, record, start, self.run.kinds);
+        let guarded = passages.last();
+        guarded.map_or_else(Row::new, |passage| passage.time.clone())
     }
 
     /// What the limit of infinitely many switches takes from the instants before.

@@ -5,7 +5,6 @@ use super::forms::{pairs, Second};
 use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
 use crate::error::{Error, FieldError};
-use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
@@ -71,18 +70,14 @@ impl<'r> Differentiated<'r> {
         let Some(columns) = self.columns(t, side)? else {
             return Ok(None);
         };
-        let (system, extended) = self.run.systems;
-        let solution = self.run.solution;
+        let (path, extended) = (self.path(side), self.run.systems.1);
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
         let mut x = vec![0.0; extended.n];
-        solution.evaluate(system, t, side, &mut x)?;
+        path(t, &mut x)?;
         let z = extended.state(&x);
-        let mut field = vec![0.0; z.len()];
-        piece
-            .field
-            .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        let field = piece.rates(t, &z)?;
         let (time, gradient) = function.at(t, &z, &piece.q)?;
         let rate = time + dot(&gradient, &field);
         let shift = |column: &Vec<f64>| -dot(&gradient, column) / rate;
@@ -151,14 +146,8 @@ impl<'r> Differentiated<'r> {
 
     /// The path of the run.
     fn path(&self, side: Side) -> impl Fn(f64, &mut [f64]) -> Result<(), FieldError> + Copy + 'r {
-        let (solution, system) = (self.run.solution, self.run.systems.0);
-        move |t: f64, x: &mut [f64]| {
-            let mode = solution.evaluate(system, t, side, x)?;
-            if mode.is_none() {
-                x.fill(f64::NAN);
-            }
-            Ok(())
-        }
+        let (solution, systems) = (self.run.solution, self.run.systems);
+        move |t: f64, x: &mut [f64]| state_at(solution, systems, (t, side), x)
     }
 
     /// The derivative of the state, with the shares of the parameters behind each column.
@@ -199,6 +188,25 @@ impl<'r> Differentiated<'r> {
         }));
         Some(piece)
     }
+}
+
+/// Writes the state at a time, with the named discrete states behind it; NaN outside of the run.
+pub(super) fn state_at(
+    solution: &Solution,
+    (system, extended): (&TracedSystem, &Extended),
+    (t, side): (f64, Side),
+    x: &mut [f64],
+) -> Result<(), FieldError> {
+    let (own, named) = x.split_at_mut(extended.n - extended.n_named);
+    let segment = solution.segment_at(t, side);
+    match segment.filter(|_| !named.is_empty()) {
+        Some(segment) => named.copy_from_slice(&segment.discrete[..named.len()]),
+        None => named.fill(f64::NAN),
+    }
+    if solution.evaluate(system, t, side, own)?.is_none() {
+        x.fill(f64::NAN);
+    }
+    Ok(())
 }
 
 /// The gradient of a function by time, states and parameters.

@@ -1,7 +1,15 @@
 //! What an instant makes of a change of the extended state.
 
+use smallvec::{smallvec, SmallVec};
+
 use crate::cube::{Elimination, Matrix, Vector};
 use crate::vectors::dot;
+
+/// A gradient, or a change of the extended state.
+pub(super) type Row = SmallVec<[f64; 8]>;
+
+/// Some of them, mostly one.
+pub(super) type Rows = SmallVec<[Row; 1]>;
 
 /// A linear map of changes c = (x, p) of the extended state, which leaves p as it is: x goes to R c + sum_i d_i s_i, where the shares s
 /// are the products g_i . c, or what solves equations with them on the right.
@@ -10,36 +18,44 @@ pub(super) struct Change {
     /// The rows of R, one for each state; x itself where there are none.
     map: Option<Vec<Vec<f64>>>,
     /// The directions d_i, of the states.
-    directions: Vec<Vec<f64>>,
+    directions: Rows,
     /// The rows g_i.
-    rows: Vec<Vec<f64>>,
-    /// The matrix of the equations of a projection, which is done twice: what is left after the first time is rounding.
-    equations: Option<Elimination>,
+    rows: Rows,
+    equations: Equations,
+}
+
+/// The equations of a projection, which is done twice: what is left after the first time is rounding.
+#[derive(Clone, Default)]
+enum Equations {
+    #[default]
+    None,
+    One(f64),
+    Several(Elimination),
 }
 
 impl Change {
     /// Of an instant that moves in time by `row` . c: each unit of time changes the state by `direction` behind the map.
-    pub fn at_moving_time(
-        map: Option<Vec<Vec<f64>>>,
-        direction: Vec<f64>,
-        row: Vec<f64>,
-    ) -> Change {
+    pub fn at_moving_time(map: Option<Vec<Vec<f64>>>, direction: Row, row: Row) -> Change {
         Change {
             map,
-            directions: vec![direction],
-            rows: vec![row],
-            equations: None,
+            directions: smallvec![direction],
+            rows: smallvec![row],
+            equations: Equations::None,
         }
     }
 
     /// Takes from a change its part along some directions of the states, so that it is normal to these gradients.
-    pub fn normal_to(normals: Vec<Vec<f64>>, directions: Vec<Vec<f64>>) -> Change {
-        let products = Matrix::of(normals.len(), |i, k| -dot(&normals[i], &directions[k]));
+    pub fn normal_to(normals: Rows, directions: Rows) -> Change {
+        let product = |i: usize, k: usize| -dot(&normals[i], &directions[k]);
+        let equations = match normals.len() {
+            1 => Equations::One(product(0, 0)),
+            count => Equations::Several(Elimination::of(Matrix::of(count, product))),
+        };
         Change {
             map: None,
             directions,
             rows: normals,
-            equations: Some(Elimination::of(products)),
+            equations,
         }
     }
 
@@ -52,15 +68,17 @@ impl Change {
 
     fn times(&self) -> usize {
         match self.equations {
-            Some(_) => 2,
-            None => 1,
+            Equations::None => 1,
+            Equations::One(_) | Equations::Several(_) => 2,
         }
     }
 
     fn apply_once(&self, n: usize, column: &mut [f64]) {
         let mut shares: Vector = self.rows.iter().map(|row| dot(row, column)).collect();
-        if let Some(equations) = &self.equations {
-            shares = equations.solve(&shares);
+        match &self.equations {
+            Equations::None => {}
+            Equations::One(product) => shares[0] /= product,
+            Equations::Several(equations) => shares = equations.solve(&shares),
         }
         if let Some(map) = &self.map {
             let image: Vec<f64> = map.iter().map(|row| dot(row, column)).collect();
@@ -80,10 +98,12 @@ impl Change {
     }
 
     fn pull_back_once(&self, n: usize, gradient: &mut [f64]) {
-        let products = |d: &Vec<f64>| dot(d, &gradient[..n]);
+        let products = |d: &Row| dot(d, &gradient[..n]);
         let mut shares: Vector = self.directions.iter().map(products).collect();
-        if let Some(equations) = &self.equations {
-            shares = equations.solve_transposed(&shares);
+        match &self.equations {
+            Equations::None => {}
+            Equations::One(product) => shares[0] /= product,
+            Equations::Several(equations) => shares = equations.solve_transposed(&shares),
         }
         if let Some(map) = &self.map {
             let behind = gradient[..n].to_vec();
@@ -136,12 +156,12 @@ mod tests {
         let map = vec![vec![1.0, 2.0, 0.5], vec![-1.0, 3.0, 0.0]];
         same_products(&Change::at_moving_time(
             Some(map),
-            vec![0.3, -0.7],
-            vec![2.0, 0.1, -0.4],
+            smallvec![0.3, -0.7],
+            smallvec![2.0, 0.1, -0.4],
         ));
         same_products(&Change::normal_to(
-            vec![vec![1.0, 2.0, 0.3]],
-            vec![vec![0.5, -0.1]],
+            smallvec![smallvec![1.0, 2.0, 0.3]],
+            smallvec![smallvec![0.5, -0.1]],
         ));
     }
 }

@@ -1,4 +1,4 @@
-//! A traced system in which parameters are states that rest.
+//! A traced system in which named discrete states and parameters are states that rest.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -6,19 +6,21 @@ use filippov_expr::{Backend, ExprError, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
+use super::change::Row;
 use super::forms::{Form, MapAt};
 use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
 use crate::record::Gradient;
 use crate::system::{
-    sides_of, Act, Action, ActionMap, Actions, Definition, PiecewiseSystem, Place, Rules,
-    TracedMap, TracedSystem, Trigger,
+    sides_of, Act, Action, ActionMap, Actions, Definition, Law, Laws, PiecewiseSystem, Place,
+    Rules, TracedMap, TracedSystem, Trigger,
 };
+use crate::tolerances::{AT_SIDE, ROUNDING};
 
 /// By what is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
-    /// A component of the initial state.
+    /// A component of the initial state, or behind these a named discrete state at the start.
     State(usize),
     /// The initial time.
     Start,
@@ -26,18 +28,23 @@ pub enum Column {
     Parameter(usize),
 }
 
-/// A system with some of its parameters as further states behind those that it has, for all values of them.
+/// A system with its named discrete states and some of its parameters as further states behind those that it has, for all values
+/// of them.
 pub struct Extension {
     system: TracedSystem,
     rules: Rules,
-    /// How many states the system has itself.
+    /// The system itself, and its laws.
+    own: TracedSystem,
+    laws: Arc<Laws>,
+    /// How many states and named discrete states the system has itself.
     n: usize,
+    n_named: usize,
     parameters: Vec<usize>,
     /// What each node of the system has become.
     made: Vec<NodeId>,
     series: Arc<SeriesCache>,
-    /// Second derivatives of switching functions.
-    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
+    /// Second derivatives of switching functions, and of what clocks read.
+    forms: Arc<Mutex<FxHashMap<NodeId, Arc<Form>>>>,
 }
 
 /// The series of changes, by the surfaces slid on and the order.
@@ -49,14 +56,17 @@ impl Extension {
     ///
     /// # Errors
     /// If an expression cannot be compiled.
-    pub fn new(system: &TracedSystem, rules: &Rules, parameters: &[usize]) -> Result<Self, Error> {
-        let n = system.n_states();
-        let definition = Definition::of(system, rules);
-        let (system, made) = definition.extended(&pairs(parameters, n), Backend::Native)?;
+    pub fn new(own: &TracedSystem, rules: &Rules, parameters: &[usize]) -> Result<Self, Error> {
+        let definition = Definition::of(own, rules);
+        let (system, made) = definition.extended(parameters, Backend::Native)?;
+        let n_named = named_of(rules);
         Ok(Extension {
+            n: system.n_states() - parameters.len(),
+            n_named,
+            laws: Arc::new(Laws::all_read(own.graph(), rules.laws.clone())?),
+            own: own.clone(),
             system,
             rules: rules.clone(),
-            n,
             parameters: parameters.to_vec(),
             made,
             series: Arc::default(),
@@ -100,61 +110,140 @@ impl Extension {
         Ok(Some(Extended {
             values: self.parameters.iter().map(|&i| values[i]).collect(),
             system: self.system.with_parameters(values.to_vec()),
+            laws: Arc::clone(&self.laws),
+            own: self.own.with_parameters(values.to_vec()),
             n: self.n,
+            n_named: self.n_named,
             maps,
             triggers: triggers.collect(),
+            recorded: actions.list.iter().map(|a| a.kind.is_some()).collect(),
             clocks,
             series: Arc::clone(&self.series),
             forms: Arc::clone(&self.forms),
         }))
     }
 
-    /// The derivatives of what a law reads, by the time and by the parameters that have become states; then its value.
-    fn clock_of(&self, law: usize) -> Result<Option<Program>, Error> {
+    /// What a law reads.
+    fn clock_of(&self, law: usize) -> Result<Option<ClockArgument>, Error> {
         let Some(&argument) = self.rules.laws[law].nodes().first() else {
             return Ok(None);
         };
         let mut graph = self.system.graph().clone();
-        let gradient = graph.gradient(self.made[argument.index()]);
+        let node = self.made[argument.index()];
+        let gradient = graph.gradient(node);
         let zero = graph.constant(0.0);
         let by_state = |state: u32| {
             let found = gradient.states.iter().find(|entry| entry.0 == state);
             found.map_or(zero, |entry| entry.1)
         };
         let mut outputs = vec![gradient.time];
-        let states = pairs(&self.parameters, self.n);
-        outputs.extend(states.into_iter().map(|(_, state)| by_state(state)));
-        outputs.push(self.made[argument.index()]);
-        let program = Program::compile(&graph, &outputs, Backend::Interpreter)?;
-        Ok(Some(program))
+        let resting = self.n - self.n_named..self.n + self.parameters.len();
+        outputs.extend(resting.map(|state| by_state(state as u32)));
+        let slopes = Program::compile(&graph, &outputs, Backend::Interpreter)?;
+        let value = Program::compile(&graph, &[node], Backend::Interpreter)?;
+        Ok(Some(ClockArgument {
+            node,
+            slopes,
+            value,
+        }))
     }
+}
+
+/// What a law reads whose times are known: its node, its derivatives by the time, then by the states that rest, and its value.
+struct ClockArgument {
+    node: NodeId,
+    slopes: Program,
+    value: Program,
 }
 
 /// An extended system with the values of a run, and the maps of its actions.
 pub struct Extended<'a> {
     pub(super) system: TracedSystem,
-    /// How many states the system has itself.
+    /// The system itself, and its laws.
+    own: TracedSystem,
+    laws: Arc<Laws>,
+    /// How many states the system has itself, the named discrete states behind them.
     pub(super) n: usize,
+    /// How many of these are named discrete states.
+    pub(super) n_named: usize,
     /// The values of the parameters that have become states.
     pub(super) values: Vec<f64>,
     /// The map of each action; none where it leaves the states as they are.
     pub(super) maps: Vec<Option<ExtendedMap<'a>>>,
     triggers: Vec<Trigger>,
-    /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the parameters.
-    clocks: Vec<Option<Program>>,
+    /// Is each action recorded as a switch?
+    recorded: Vec<bool>,
+    /// What the law reads whose times an action has, if it has those of one.
+    clocks: Vec<Option<ClockArgument>>,
     series: Arc<SeriesCache>,
-    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
+    forms: Arc<Mutex<FxHashMap<NodeId, Arc<Form>>>>,
 }
 
 impl Extended<'_> {
     /// The action that a surface triggers and that moves the state, if there is one.
     pub(super) fn triggered_by(&self, surface: usize) -> Option<usize> {
-        let is_own = |(action, trigger): (usize, &Trigger)| {
-            matches!(trigger, Trigger::Surface { index, .. } if *index == surface)
-                && self.moves(action)
+        let is_own =
+            |&action: &usize| self.surface_of(action) == Some(surface) && self.moves(action);
+        (0..self.triggers.len()).find(is_own)
+    }
+
+    /// The surface that triggers an action, if one does.
+    pub(super) fn surface_of(&self, action: usize) -> Option<usize> {
+        match self.triggers.get(action) {
+            Some(Trigger::Surface { index, .. }) => Some(*index),
+            _ => None,
+        }
+    }
+
+    /// Is an action done at a known time, that of a clock or a list?
+    pub(super) fn is_timed(&self, action: usize) -> bool {
+        matches!(
+            self.triggers.get(action),
+            Some(Trigger::Times(_) | Trigger::Clock { .. })
+        )
+    }
+
+    /// The derivative of the time of an action at a known time, a row; none for other actions.
+    pub(super) fn time_of_tick(&self, action: usize, place: &Place) -> Option<Row> {
+        self.is_timed(action)
+            .then(|| match self.clock(action, place) {
+                Some((time, state)) => state.iter().map(|g| -g / time).collect(),
+                None => Row::from_elem(0.0, self.n + self.values.len()),
+            })
+    }
+
+    /// The derivatives of the times of the ticks of laws at a time.
+    pub(super) fn ticks_at(&self, place: &Place) -> Vec<Row> {
+        let is_there = |trigger: &Trigger| match trigger {
+            Trigger::Clock { clock, at_start } => !at_start && clock.tick_at(place.t).is_some(),
+            Trigger::Times(times) => times
+                .iter()
+                .any(|t| (t - place.t).abs() <= ROUNDING * (1.0 + t.abs())),
+            _ => false,
         };
-        let mut all = self.triggers.iter().enumerate();
-        all.find_map(|(action, trigger)| is_own((action, trigger)).then_some(action))
+        let there = self.triggers.iter().enumerate();
+        let there = there.filter(|(_, trigger)| is_there(trigger));
+        there
+            .filter_map(|(action, _)| self.time_of_tick(action, place))
+            .collect()
+    }
+
+    /// The discrete states just before a time at which clocks tick, at a state of the system and of the discrete states behind it.
+    pub(super) fn discrete_before(
+        &self,
+        t: f64,
+        (x, q): (&[f64], &[f64]),
+    ) -> Result<Vec<f64>, FieldError> {
+        let earlier = t - AT_SIDE * (1.0 + t.abs());
+        let x = &x[..self.n - self.n_named];
+        let mut found = self.laws.start(&self.own, earlier, x)?;
+        found[..self.n_named].copy_from_slice(&q[..self.n_named]);
+        Ok(found)
+    }
+
+    /// Is an action recorded as a switch?
+    pub(super) fn is_recorded(&self, action: usize) -> bool {
+        self.recorded.get(action).copied().unwrap_or(false)
     }
 
     /// Does an action move the state?
@@ -164,14 +253,30 @@ impl Extended<'_> {
 
     /// The second derivative of a switching function.
     pub(super) fn form_of_surface(&self, j: usize) -> Result<Arc<Form>, ExprError> {
+        self.form_of(self.system.graph().clone().surface(j as u32))
+    }
+
+    /// The second derivative of what the clock reads whose tick an action is, and its rate; `None` if the time does not move.
+    pub(super) fn form_of_tick(
+        &self,
+        action: usize,
+        place: &Place,
+    ) -> Result<Option<(Arc<Form>, f64)>, ExprError> {
+        let argument = self.clocks.get(action).and_then(Option::as_ref);
+        match (argument, self.clock(action, place)) {
+            (Some(argument), Some((rate, _))) => Ok(Some((self.form_of(argument.node)?, rate))),
+            _ => Ok(None),
+        }
+    }
+
+    fn form_of(&self, node: NodeId) -> Result<Arc<Form>, ExprError> {
         let mut known = self.forms.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(form) = known.get(&j) {
+        if let Some(form) = known.get(&node) {
             return Ok(Arc::clone(form));
         }
-        let graph = self.system.graph();
         let size = self.n + self.values.len();
-        let form = Arc::new(Form::new(graph, &[graph.clone().surface(j as u32)], size)?);
-        known.insert(j, Arc::clone(&form));
+        let form = Arc::new(Form::new(self.system.graph(), &[node], size)?);
+        known.insert(node, Arc::clone(&form));
         Ok(form)
     }
 
@@ -180,7 +285,7 @@ impl Extended<'_> {
         let Some(map) = self.maps.get(act.index).and_then(Option::as_ref) else {
             return Ok(None);
         };
-        map.second((t, &act.x, &act.discrete), &self.values)
+        map.second((t, &act.x), &self.values)
     }
 
     /// The series of the changes of the motions on these surfaces, or of pairs of changes, if they have any.
@@ -214,21 +319,33 @@ impl Extended<'_> {
         }
     }
 
+    /// How many rows a column has: one for each state, and behind these one for each named discrete state.
+    pub fn n_rows(&self) -> usize {
+        self.n
+    }
+
     /// How many parameters have become states.
     pub fn n_parameters(&self) -> usize {
         self.values.len()
     }
 
-    /// The value of the clock whose tick an action is, with its derivatives by the time and by the extended state; `None` if it ticks
-    /// whatever the parameters.
-    pub(super) fn clock(&self, index: usize, place: &Place) -> Option<(f64, Gradient)> {
-        let program = self.clocks.get(index)?.as_ref()?;
-        let m = self.values.len();
-        let mut out = vec![0.0; 2 + m];
+    /// The value of what the clock reads whose tick an action is, with its derivatives; `None` if it ticks whatever the parameters.
+    pub(super) fn clock_value(&self, index: usize, place: &Place) -> Option<(f64, Gradient)> {
+        let program = &self.clocks.get(index)?.as_ref()?.value;
+        let mut value = [0.0];
+        self.system.eval(program, place, &[], &mut value);
+        let (time, state) = self.clock(index, place)?;
+        Some((value[0], Gradient { time, state }))
+    }
+
+    /// The derivatives of the clock whose tick an action is, by the time and by the extended state; `None` if it ticks whatever the
+    /// parameters.
+    fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
+        let program = &self.clocks.get(index)?.as_ref()?.slopes;
+        let mut out = vec![0.0; 1 + self.n_named + self.values.len()];
         self.system.eval(program, place, &[], &mut out);
-        let state = [&vec![0.0; self.n], &out[1..1 + m]].concat();
-        let time = out[0];
-        Some((out[1 + m], Gradient { time, state }))
+        let state = [&vec![0.0; self.n - self.n_named], &out[1..]].concat();
+        Some((out[0], state))
     }
 
     /// The columns at the start of a run with this velocity.
@@ -255,50 +372,81 @@ impl Extended<'_> {
         column
     }
 
-    /// The state with the parameters behind it.
-    pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
-        [x, &self.values].concat()
+    /// The state, with the named discrete states, and the parameters behind it.
+    pub(super) fn state(&self, x: &[f64]) -> Row {
+        let mut z = Row::from_slice(x);
+        z.extend_from_slice(&self.values);
+        z
+    }
+
+    /// The state of the system with its named discrete states behind it, which are the first ones.
+    pub(super) fn with_named(&self, x: &[f64], discrete: &[f64]) -> Row {
+        let mut x = Row::from_slice(x);
+        x.extend_from_slice(&discrete[..self.n_named]);
+        x
+    }
+
+    /// Writes the state of the system and behind it its named discrete states.
+    pub(super) fn write_with_named(
+        &self,
+        x: &mut [f64],
+        discrete: &[f64],
+        write: impl FnOnce(&mut [f64]),
+    ) {
+        let (own, named) = x.split_at_mut(self.n - self.n_named);
+        write(own);
+        named.copy_from_slice(&discrete[..self.n_named]);
     }
 }
 
-/// The system of a function with these parameters as states that rest, behind its own; its program is called a few times.
+/// How many discrete states of a system have names: the first ones.
+fn named_of(rules: &Rules) -> usize {
+    let is_named = |law: &&Law| matches!(law, Law::Named { .. });
+    rules.laws.iter().filter(is_named).count()
+}
+
+/// The system of a function with named discrete states and these parameters as states that rest, behind its own; its program is
+/// called a few times.
 pub(super) fn extended_system(
     system: &TracedSystem,
     rules: &Rules,
     parameters: &[usize],
 ) -> Result<TracedSystem, Error> {
-    let pairs = pairs(parameters, system.n_states());
     let definition = Definition::of(system, rules);
-    let (extended, _) = definition.extended(&pairs, Backend::Interpreter)?;
+    let (extended, _) = definition.extended(parameters, Backend::Interpreter)?;
     Ok(extended.with_parameters(system.parameters().to_vec()))
 }
 
-/// Parameters with the states that they become, behind n others.
-fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
+/// Inputs of a graph with the states that they become, behind n others.
+fn pairs(inputs: impl IntoIterator<Item = usize>, n: usize) -> Vec<(u32, u32)> {
     let states = (n as u32)..;
-    let parameters = parameters.iter().map(|&index| index as u32);
-    parameters.zip(states).collect()
+    let inputs = inputs.into_iter().map(|index| index as u32);
+    inputs.zip(states).collect()
 }
 
 impl Definition {
-    /// Makes a system in which the second number of each pair is a state that rests, and replaces the parameter with the first number.
-    /// Returns it with the new node for each old one. It has no laws: the caller hands in the discrete states.
+    /// Makes a system in which its named discrete states and these parameters are states that rest, in this order. Returns it with the
+    /// new node for each old one. It has no laws: the caller hands in the discrete states.
     fn extended(
         &self,
-        parameters: &[(u32, u32)],
+        parameters: &[usize],
         backend: Backend,
     ) -> Result<(TracedSystem, Vec<NodeId>), Error> {
-        let (mut graph, made) = self.graph.with_states_for(parameters);
+        // The graph has the discrete states behind the parameters.
+        let (n, n_parameters) = (self.field.len(), self.n_parameters());
+        let named = (0..named_of(&self.rules)).map(|k| n_parameters + k);
+        let pairs = pairs(named.chain(parameters.iter().copied()), n);
+        let (mut graph, made) = self.graph.with_states_for(&pairs);
         let still = graph.constant(0.0);
         let mut field: Vec<NodeId> = self.field.iter().map(|id| made[id.index()]).collect();
-        field.resize(field.len() + parameters.len(), still);
+        field.resize(n + pairs.len(), still);
         let ratios = self.rules.sticking.iter();
         let ratios: Vec<_> = ratios.map(|&(j, id)| (j, made[id.index()])).collect();
         let names = Names {
             states: Vec::new(),
             parameters: self.names.parameters.clone(),
         };
-        let values = vec![0.0; self.n_parameters()];
+        let values = vec![0.0; n_parameters];
         let system = TracedSystem::new(graph, field, values, names, backend)?;
         let system = system.watching(&self.rules.watched).sticking(&ratios);
         Ok((system.with_discrete(self.rules.laws.len()), made))
@@ -321,21 +469,15 @@ pub(super) struct ExtendedMap<'a> {
 
 impl<'a> ExtendedMap<'a> {
     fn new(expressions: &'a TracedSystem, parameters: &[usize], n: usize) -> Result<Self, Error> {
-        let n_all = expressions.n_states();
-        let pairs = pairs(parameters, n_all);
+        let pairs = pairs(parameters.iter().copied(), n);
         let (mut graph, made) = expressions.graph().with_states_for(&pairs);
         let (mut entries, mut outputs, mut by_time) = (Vec::new(), Vec::new(), Vec::new());
-        for (r, id) in expressions.field_nodes()[..n].iter().enumerate() {
+        for (r, id) in expressions.field_nodes().iter().enumerate() {
             let gradient = graph.gradient(made[id.index()]);
             by_time.push(gradient.time);
             for (input, node) in gradient.states {
-                let input = input as usize;
-                // Named discrete states stand between the states and the parameters.
-                if input < n || input >= n_all {
-                    let behind = input.checked_sub(n_all).map(|p| n + p);
-                    entries.push((r, behind.unwrap_or(input)));
-                    outputs.push(node);
-                }
+                entries.push((r, input as usize));
+                outputs.push(node);
             }
         }
         outputs.extend(by_time);
@@ -362,14 +504,12 @@ impl<'a> ExtendedMap<'a> {
     /// The derivatives of the new state at a place: n rows by the states and the parameters, and by the time.
     pub fn derivative(
         &self,
-        (t, x, q): (f64, &[f64], &[f64]),
+        (t, x): (f64, &[f64]),
         values: &[f64],
     ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
         let expressions = self.expressions;
-        let n_named = expressions.n_states() - self.n;
-        let before: Vec<f64> = x.iter().chain(q.iter().take(n_named)).copied().collect();
-        let signs = sides_of(expressions, (t, &before), &[])?;
-        let z = [&before[..], values].concat();
+        let signs = sides_of(expressions, (t, x), &[])?;
+        let z = [x, values].concat();
         let mut out = vec![0.0; self.entries.len() + self.n];
         let place = Place::new(t, &z, &signs);
         expressions.eval(&self.derivative, &place, &[], &mut out);
@@ -384,13 +524,13 @@ impl<'a> ExtendedMap<'a> {
     /// The first and second derivatives of the new state at a place; `None` if the map cannot be compiled.
     fn second(
         &self,
-        (t, x, q): (f64, &[f64], &[f64]),
+        (t, x): (f64, &[f64]),
         values: &[f64],
     ) -> Result<Option<MapAt<'_>>, FieldError> {
         let Some(system) = self.extended.expressions() else {
             return Ok(None);
         };
-        let size = self.expressions.n_states() + values.len();
+        let size = self.n + values.len();
         let form = self.form.get_or_init(|| {
             let nodes = &system.field_nodes()[..self.n];
             Form::new(system.graph(), nodes, size).ok()
@@ -398,15 +538,14 @@ impl<'a> ExtendedMap<'a> {
         let Some(form) = form else {
             return Ok(None);
         };
-        let n_named = self.expressions.n_states() - self.n;
-        let (rows, by_time) = self.derivative((t, x, q), values)?;
+        let (rows, by_time) = self.derivative((t, x), values)?;
         Ok(Some(MapAt {
             rows,
             by_time,
             form,
             system,
             t,
-            inputs: [x, &q[..n_named.min(q.len())], values].concat(),
+            inputs: [x, values].concat(),
             n: self.n,
         }))
     }

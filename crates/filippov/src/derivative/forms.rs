@@ -81,7 +81,7 @@ pub(super) struct MapAt<'m> {
     pub form: &'m Form,
     pub system: &'m TracedSystem,
     pub t: f64,
-    /// The state with the discrete states and the parameters behind it.
+    /// The state with the parameters behind it.
     pub inputs: Vec<f64>,
     pub n: usize,
 }
@@ -96,17 +96,12 @@ impl MapAt<'_> {
 
     /// The mixed derivative behind, from that before, that of the time, and both changes.
     pub fn second_image(&self, q: &[f64], tau: f64, u: &Moved, v: &Moved) -> Vec<f64> {
-        let named = self.inputs.len() - u.z.len();
-        let spread = |by: &Moved| Moved {
-            time: by.time,
-            z: [&by.z[..self.n], &vec![0.0; named], &by.z[self.n..]].concat(),
-        };
         let none: &[f64] = &[];
         let Ok(signs) = sides_of(self.system, (self.t, &self.inputs), none) else {
             return vec![f64::NAN; self.n];
         };
         let place = Place::new(self.t, &self.inputs, &signs);
-        let bend = self.form.at(self.system, &place, &spread(u), &spread(v));
+        let bend = self.form.at(self.system, &place, u, v);
         let rows = self.rows.iter().zip(&self.by_time).zip(&bend);
         rows.map(|((row, by_time), bend)| dot(&row[..self.n], q) + by_time * tau + bend)
             .collect()

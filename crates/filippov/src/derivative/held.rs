@@ -1,18 +1,20 @@
 //! A motion in one mode, whatever its guards are: these guards, with their derivatives.
 
+use super::change::Row;
 use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Guard, SmoothField};
+use crate::motion::Guard;
 use crate::options::Options;
 use crate::record::Gradient;
-use crate::system::{Act, ActionMap, Actions, PiecewiseSystem, SignStructure};
+use crate::system::{ActionMap, Actions, PiecewiseSystem, Setting, SignStructure, TracedSystem};
 
 /// The motion of a mode, asked at places that it need not be admissible at.
 pub struct HeldMotion<'a> {
     piece: Piece<'a>,
     guards: Vec<Guard>,
+    q: Vec<f64>,
 }
 
 /// A guard at a place: positive while the motion lasts.
@@ -44,7 +46,7 @@ pub struct ActionAt {
 impl<'a> HeldMotion<'a> {
     /// The motion of a mode with these discrete states.
     pub fn new(
-        extended: &'a Extended<'a>,
+        (system, extended): (&TracedSystem, &'a Extended<'a>),
         impacts: &'a Actions<'a>,
         options: &'a Options,
         mode: &Mode,
@@ -55,13 +57,16 @@ impl<'a> HeldMotion<'a> {
         let piece = Piece::new(&around, mode, q);
         let sliding: Vec<usize> = mode.sliding_set().collect();
         let mut active = vec![false; mode.entries().len()];
-        let system = &extended.system;
         system.active(&mode.signs(), &sliding, &mut active);
         let entries = mode.entries().iter().enumerate();
         let surfaces = entries.filter(|(j, entry)| active[*j] && **entry != 0);
         let mut guards: Vec<Guard> = surfaces.map(|(j, _)| Guard::Surface(j)).collect();
         guards.extend(piece.field.guards());
-        HeldMotion { piece, guards }
+        HeldMotion {
+            piece,
+            guards,
+            q: q.to_vec(),
+        }
     }
 
     /// What ends the motion.
@@ -69,17 +74,21 @@ impl<'a> HeldMotion<'a> {
         &self.guards
     }
 
-    /// The velocity at a place, with the parameters, which rest.
+    /// The velocity at a place.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn velocity(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let mut z = self.piece.extended.state(x);
-        let mut velocity = vec![0.0; z.len()];
-        self.piece
-            .field
-            .eval_unprojected(t, &mut z, &mut velocity)?;
-        Ok(velocity)
+        let z = self.state(x);
+        let mut velocity = self.piece.rates(t, &z)?;
+        velocity.truncate(x.len());
+        Ok(velocity.to_vec())
+    }
+
+    /// The extended state: named discrete states and parameters behind the states.
+    fn state(&self, x: &[f64]) -> Row {
+        let extended = self.piece.extended;
+        extended.state(&extended.with_named(x, &self.q))
     }
 
     /// The multipliers at the place asked about last, in the order of the surfaces slid on.
@@ -92,7 +101,7 @@ impl<'a> HeldMotion<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn values(&mut self, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let z = self.piece.extended.state(x);
+        let z = self.state(x);
         let mut h = vec![0.0; self.piece.mode.entries().len()];
         let system = &self.piece.extended.system;
         system.surfaces(&self.piece.at(t, &z), &mut h)?;
@@ -120,7 +129,7 @@ impl<'a> HeldMotion<'a> {
     /// If a function of the user raises.
     pub fn guards_at(&mut self, t: f64, x: &[f64]) -> Result<Vec<GuardAt>, FieldError> {
         let values = self.values(t, x)?;
-        let z = self.piece.extended.state(x);
+        let z = self.state(x);
         let mut found = Vec::with_capacity(values.len());
         for (place, value) in values.into_iter().enumerate() {
             let guard = self.guards[place];
@@ -132,10 +141,12 @@ impl<'a> HeldMotion<'a> {
             };
             gradient.time *= sense;
             gradient.state.iter_mut().for_each(|entry| *entry *= sense);
+            let time = gradient.time;
+            let state = self.piece.extended.without_named(&gradient.state);
             found.push(GuardAt {
                 guard,
                 value,
-                gradient,
+                gradient: Gradient { time, state },
             });
         }
         Ok(found)
@@ -162,26 +173,35 @@ impl Extended<'_> {
         let signs = mode.signs();
         let map: &dyn ActionMap = actions.list[index].map;
         map.apply(t, &mut after, &signs, &mut discrete)?;
+        let before = self.with_named(x, q);
         let derivative = match self.maps.get(index).and_then(Option::as_ref) {
-            Some(map) => Some(map.derivative((t, x, q), &self.values)?),
+            Some(map) => Some(map.derivative((t, &before), &self.values)?),
             None => None,
         };
-        let (rows, by_time) = derivative.map_or((None, vec![0.0; x.len()]), |(rows, by_time)| {
-            (Some(rows), by_time)
+        let (rows, mut by_time) = derivative.unzip();
+        let rows = rows.map(|rows| {
+            let own = rows.iter().take(x.len());
+            own.map(|row| self.without_named(row)).collect()
         });
-        let z = self.state(x);
-        let place = crate::system::Setting::new(&signs, q).at(t, &z);
-        let act = Act {
-            index,
-            x: x.to_vec(),
-            discrete: q.to_vec(),
-        };
+        let by_time = by_time.take().unwrap_or_else(|| vec![0.0; x.len()]);
+        let z = self.state(&before);
+        let place = Setting::new(&signs, q).at(t, &z);
+        let clock = self.clock_value(index, &place);
         Ok(ActionAt {
             x: after,
             q: discrete,
             rows,
-            by_time,
-            clock: self.clock(act.index, &place),
+            by_time: by_time[..x.len()].to_vec(),
+            clock: clock.map(|(value, gradient)| {
+                let state = self.without_named(&gradient.state);
+                (value, Gradient { state, ..gradient })
+            }),
         })
+    }
+
+    /// A row by the states and the parameters, without the named discrete states between them.
+    fn without_named(&self, row: &[f64]) -> Vec<f64> {
+        let own = self.n - self.n_named;
+        [&row[..own], &row[self.n..]].concat()
     }
 }

@@ -1,12 +1,14 @@
 //! The saltation matrix: what an instant makes of a change of the state.
 
-use super::change::Change;
+use smallvec::SmallVec;
+
+use super::change::{Change, Row, Rows};
 use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
-use crate::record::{Gradient, InstantRecord};
-use crate::system::SignStructure;
+use crate::record::InstantRecord;
+use crate::system::{Act, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -79,11 +81,13 @@ pub(super) struct Instant<'i, 'a> {
 /// What an instant does to changes of the extended state.
 pub(super) struct Passage {
     /// The derivative of the time, a row.
-    pub time: Vec<f64>,
+    pub time: Row,
     /// What becomes of a change, one after the other.
-    pub changes: Vec<Change>,
+    pub changes: SmallVec<[Change; 1]>,
     /// The field goes on: the time alone is of interest.
     pub goes_on: bool,
+    /// So many of its actions are recorded as switches, where others happen at the same time.
+    pub n_recorded: usize,
 }
 
 impl Instant<'_, '_> {
@@ -107,13 +111,18 @@ impl Instant<'_, '_> {
         }
         let mut passage = Passage {
             time,
-            changes: Vec::new(),
+            changes: SmallVec::new(),
             goes_on: self.leaves_as_it_is(),
+            n_recorded: 0,
         };
         if passage.goes_on {
             return Ok(Ok(passage));
         }
         if let Some(entry) = self.entry()? {
+            let z = self.extended.state(record.x[1]);
+            if self.after.stays_at_an_end(record.t[1], &z)? {
+                return Ok(Err(Lost::OneSided));
+            }
             passage.changes.push(entry);
             return Ok(Ok(passage));
         }
@@ -144,21 +153,20 @@ impl Instant<'_, '_> {
         &mut self,
         weights: &Weights,
         condition: &mut f64,
-    ) -> Result<Result<Vec<f64>, Lost>, FieldError> {
+    ) -> Result<Result<Row, Lost>, FieldError> {
         let record = self.record;
-        let timing = match record.guards {
-            [] => self.known_time(),
-            [guard, ..] => {
-                let z = self.extended.state(record.x[0]);
-                self.before.gradient_of(*guard, record.t[0], &z)?
-            }
+        let Some(guard) = self.guard() else {
+            *condition = 1.0;
+            let mut acts = record.acts.iter();
+            let time = acts.find_map(|act| self.time_of_tick(act));
+            let fixed = || Row::from_elem(0.0, self.extended.n + self.extended.n_parameters());
+            return Ok(Ok(time.unwrap_or_else(fixed)));
         };
+        let z = self.extended.state(record.x[0]);
+        let timing = self.before.gradient_of(guard, record.t[0], &z)?;
         let field = record.field[0];
         let states = &timing.state[..self.extended.n];
-        *condition = match record.guards {
-            [] => 1.0,
-            _ => weights.condition(record.x[0], (timing.time, states), field),
-        };
+        *condition = weights.condition(record.x[0], (timing.time, states), field);
         let rate = timing.time + dot(&timing.state, field);
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
@@ -170,17 +178,19 @@ impl Instant<'_, '_> {
         Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))
     }
 
-    /// What fixes a known time: the clock that ticks, or the time alone.
-    fn known_time(&self) -> Gradient {
-        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
-        let place = self.before.at(t, &z);
-        let mut acts = self.record.acts.iter();
-        let clock = acts.find_map(|act| self.extended.clock(act.index, &place));
-        let alone = || Gradient {
-            time: 1.0,
-            state: vec![0.0; z.len()],
-        };
-        clock.map_or_else(alone, |(_, gradient)| gradient)
+    /// The guard that fixes the time, if it is no known time: also that of a start on the surface of an action.
+    pub fn guard(&self) -> Option<Guard> {
+        let first = self.record.acts.first();
+        let surface = first.and_then(|act| self.extended.surface_of(act.index));
+        let guards = self.record.guards.first().copied();
+        guards.or(surface.map(Guard::Surface))
+    }
+
+    /// The derivative of the time of an action at a known time, a row; none for other actions.
+    pub fn time_of_tick(&self, act: &Act) -> Option<Row> {
+        let z = self.extended.state(self.record.x[0]);
+        let place = self.before.at(self.record.t[0], &z);
+        self.extended.time_of_tick(act.index, &place)
     }
 
     /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.
@@ -231,12 +241,12 @@ impl Instant<'_, '_> {
     fn mapped(&self) -> Result<Mapped, FieldError> {
         let (n, values) = (self.extended.n, &self.extended.values);
         let mut total: Option<Vec<Vec<f64>>> = None;
-        let mut along = self.record.field[0].to_vec();
+        let mut along = Row::from_slice(self.record.field[0]);
         for act in self.record.acts {
             let Some(map) = self.extended.maps.get(act.index).and_then(Option::as_ref) else {
                 continue;
             };
-            let place = (self.record.t[0], &act.x[..], &act.discrete[..]);
+            let place = (self.record.t[0], &act.x[..]);
             let (rows, by_time) = map.derivative(place, values)?;
             let moved = rows.iter().zip(&by_time);
             along = moved
@@ -252,7 +262,7 @@ impl Instant<'_, '_> {
 }
 
 /// The rows of the derivative of maps, if any moves the state, and what becomes of the field before.
-type Mapped = (Option<Vec<Vec<f64>>>, Vec<f64>);
+type Mapped = (Option<Vec<Vec<f64>>>, Row);
 
 /// A row of the derivative of a map behind another one.
 fn chained(n: usize, row: &[f64], earlier: &[Vec<f64>]) -> Vec<f64> {
@@ -319,14 +329,14 @@ pub(super) fn arrival(piece: &Piece, t: f64, z: &[f64]) -> Result<Option<Change>
 /// Surfaces with the jumps of the field there.
 #[derive(Default)]
 struct Jumps {
-    changes: Vec<Vec<f64>>,
-    normals: Vec<Vec<f64>>,
+    changes: Rows,
+    normals: Rows,
 }
 
 impl Jumps {
     /// What takes from a change its parts off the surfaces, along the jumps.
     fn taken_out(&self, n: usize) -> Change {
-        let directions = self.changes.iter().map(|jump| jump[..n].to_vec());
+        let directions = self.changes.iter().map(|jump| Row::from_slice(&jump[..n]));
         Change::normal_to(self.normals.clone(), directions.collect())
     }
 }

@@ -3,6 +3,8 @@
 //! If the times between rounds shrink by the ratio r, the limit of a sequence is x + (x - x') r / (1 - r), x' one round before x. Times,
 //! and states at these times, are such sequences; r is the ratio of the last two rounds.
 
+use std::collections::VecDeque;
+
 use smallvec::SmallVec;
 
 use crate::mode::Mode;
@@ -14,20 +16,28 @@ use crate::vectors::dot;
 const MOST_REMEMBERED: usize = 17;
 
 /// An instant, seen from the motion before it.
-pub(super) struct Past {
-    pub t: f64,
-    pub x: Vec<f64>,
-    pub guards: SmallVec<[Guard; 2]>,
-    pub mode: Mode,
+struct Past {
+    t: f64,
+    x: Vec<f64>,
+    field: Vec<f64>,
+    guards: SmallVec<[Guard; 2]>,
+    mode: Mode,
     /// The derivative of the time by each column.
-    pub dt: Vec<f64>,
-    /// The derivative of the state at that time by each column.
-    pub dx: Vec<Vec<f64>>,
+    dt: Vec<f64>,
+    /// The derivative of the state before by each column, one behind the other.
+    columns: Vec<f64>,
 }
 
 impl Past {
     fn is_like(&self, other: &Past) -> bool {
         self.guards == other.guards && self.mode == other.mode
+    }
+
+    /// The derivative by a column of the state at the time of the instant.
+    fn dx(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
+        let n = self.x.len();
+        let states = self.columns[column * n..][..n].iter().zip(&self.field);
+        states.map(move |(entry, f)| entry + f * self.dt[column])
     }
 }
 
@@ -103,7 +113,7 @@ impl Shares {
 
 /// The instants so far, the latest last.
 #[derive(Default)]
-pub(super) struct History(Vec<Past>);
+pub(super) struct History(VecDeque<Past>);
 
 /// The limit of instants: its time by each column, and its state.
 pub(super) struct Limit {
@@ -112,11 +122,66 @@ pub(super) struct Limit {
 }
 
 impl History {
-    pub fn push(&mut self, past: Past) {
-        if self.0.len() == MOST_REMEMBERED {
-            self.0.remove(0);
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Lets the instants follow a change of the columns, each of which is a combination of the old ones.
+    pub fn change(&mut self, change: &[Vec<f64>]) {
+        for past in &mut self.0 {
+            let n = past.x.len();
+            let mut columns = vec![0.0; n * change.len()];
+            for (sum, factors) in columns.chunks_exact_mut(n.max(1)).zip(change) {
+                for (factor, column) in factors.iter().zip(past.columns.chunks_exact(n.max(1))) {
+                    let entries = sum.iter_mut().zip(column);
+                    entries.for_each(|(entry, d)| *entry += factor * d);
+                }
+            }
+            past.dt = change
+                .iter()
+                .map(|factors| dot(factors, &past.dt))
+                .collect();
+            past.columns = columns;
         }
-        self.0.push(past);
+    }
+
+    /// Takes an instant down, with the columns before it and the derivatives of its time.
+    pub fn push(&mut self, record: &InstantRecord, columns: &[Vec<f64>], dt: &[f64]) {
+        let n = record.x[0].len();
+        let states = columns.iter().flat_map(|column| &column[..n]).copied();
+        // The room of the oldest is used again.
+        let oldest = match self.0.len() {
+            MOST_REMEMBERED => self.0.pop_front(),
+            _ => None,
+        };
+        let Some(mut past) = oldest else {
+            self.0.push_back(Past {
+                t: record.t[0],
+                x: record.x[0].to_vec(),
+                field: record.field[0].to_vec(),
+                guards: record.guards.into(),
+                mode: record.mode[0].clone(),
+                dt: dt.to_vec(),
+                columns: states.collect(),
+            });
+            return;
+        };
+        past.t = record.t[0];
+        past.guards = record.guards.into();
+        past.mode.clone_from(record.mode[0]);
+        let rows = [
+            (&mut past.x, record.x[0]),
+            (&mut past.field, record.field[0]),
+            (&mut past.dt, dt),
+        ];
+        for (row, values) in rows {
+            row.clear();
+            row.extend_from_slice(values);
+        }
+        past.columns.clear();
+        past.columns.extend(states);
+        self.0.push_back(past);
     }
 
     /// The limit of the rounds, if the latest instants make any.
@@ -134,7 +199,7 @@ impl History {
             let (d_late, d_early) = (now.dt[c] - before.dt[c], before.dt[c] - first.dt[c]);
             let d_share = (d_late - rounds.ratio * d_early) * slope;
             dt.push(now.dt[c] + d_late * share + rounds.late * d_share);
-            let states = now.dx[c].iter().zip(&before.dx[c]);
+            let states = now.dx(c).zip(before.dx(c));
             let moved = now.x.iter().zip(&before.x);
             let limit = states.zip(moved).map(|((now, before), (x, x_before))| {
                 now + (now - before) * share + (x - x_before) * d_share
@@ -143,13 +208,4 @@ impl History {
         }
         Some(Limit { dt, dx })
     }
-}
-
-/// The derivatives of a state at the time of an instant, from those at one time and of the instant.
-pub(super) fn at_its_time(columns: &[Vec<f64>], field: &[f64], dt: &[f64]) -> Vec<Vec<f64>> {
-    let moved = columns.iter().zip(dt).map(|(column, dt)| {
-        let states = column.iter().zip(field);
-        states.map(|(entry, f)| entry + f * dt).collect()
-    });
-    moved.collect()
 }

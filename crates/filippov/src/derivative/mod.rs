@@ -10,14 +10,18 @@
 
 mod adjoint;
 mod between;
+mod borders;
 mod change;
 mod collocation;
+mod exponents;
 mod extended;
 mod forms;
 mod held;
 mod instant;
 mod limit;
 mod one_sided;
+mod orthonormal;
+mod parts;
 mod passing;
 mod piece;
 mod radau;
@@ -27,6 +31,8 @@ mod tangents;
 
 pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
 pub use between::{Differentiated, DifferentiatedRun, EventGradient};
+pub use borders::Borders;
+pub use exponents::{Exponents, Growth};
 pub use extended::{Column, Extended, Extension};
 pub use held::{ActionAt, GuardAt, HeldMotion};
 pub use instant::Lost;

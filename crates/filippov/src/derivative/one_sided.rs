@@ -1,17 +1,19 @@
 //! Where a derivative has sides: several surfaces that are reached at once, and motions that touch one.
 
-use super::change::{matrices, Change};
+use smallvec::{smallvec, SmallVec};
+
+use super::change::{matrices, Change, Row};
 use super::instant::{entered, Instant};
 use super::piece::Piece;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Guard, SmoothField};
+use crate::motion::Guard;
 use crate::system::LieDerivatives;
 use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
 
 /// So many surfaces at one instant have all their orders looked at.
-const MOST_AT_ONCE: usize = 3;
+pub(super) const MOST_AT_ONCE: usize = 3;
 
 /// The derivative of the state behind an instant in a cone of changes before it.
 #[derive(Clone, Debug)]
@@ -27,7 +29,7 @@ pub struct OneSided {
 /// What happens to changes in one of the cones.
 pub(super) struct Cone {
     pub order: Vec<usize>,
-    pub changes: Vec<Change>,
+    pub changes: SmallVec<[Change; 1]>,
 }
 
 impl Cone {
@@ -79,7 +81,7 @@ impl<'a> Instant<'_, 'a> {
         let Some(surfaces) = surfaces.filter(|all| {
             let differs = |j: usize| entries[0][j] != entries[1][j];
             record.acts.is_empty()
-                && all.len() <= MOST_AT_ONCE
+                && (2..=MOST_AT_ONCE).contains(&all.len())
                 && (0..entries[0].len()).all(|j| all.contains(&j) == differs(j))
                 && all.iter().all(|&j| entries[0][j] != 0)
         }) else {
@@ -95,13 +97,16 @@ impl<'a> Instant<'_, 'a> {
         Ok(Some(cones))
     }
 
-    fn one_after_the_other(&mut self, order: &[usize]) -> Result<Option<Vec<Change>>, FieldError> {
+    fn one_after_the_other(
+        &mut self,
+        order: &[usize],
+    ) -> Result<Option<SmallVec<[Change; 1]>>, FieldError> {
         let record = self.record;
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
         let mut mode: Mode = record.mode[0].clone();
-        let mut field = record.field[0].to_vec();
+        let mut field = Row::from_slice(record.field[0]);
         let mut sliding = self.before.sliding.clone();
-        let mut changes = Vec::new();
+        let mut changes = SmallVec::new();
         for (number, &j) in order.iter().enumerate() {
             let normal = |piece: &Piece, k: usize| -> Result<(f64, Vec<f64>), FieldError> {
                 let mut row = vec![0.0; z.len()];
@@ -112,8 +117,7 @@ impl<'a> Instant<'_, 'a> {
             let rate = time + dot(&row, &field);
             mode = mode.with(j, record.mode[1].entries()[j]);
             let mut next = Piece::new(self.around, &mode, record.discrete[1]);
-            let mut rates = vec![0.0; z.len()];
-            next.field.eval_unprojected(t, &mut z.clone(), &mut rates)?;
+            let mut rates = next.rates(t, &z)?;
             rates.truncate(field.len());
             // The mode between has to be one that the motion keeps until it reaches the next surface.
             let slides_on = next.field.multipliers().iter().all(|l| l.abs() <= 1.0);
@@ -170,15 +174,15 @@ impl<'a> Instant<'_, 'a> {
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
         let missed = Cone {
             order: Vec::new(),
-            changes: Vec::new(),
+            changes: SmallVec::new(),
         };
         let beyond = self.before.corner(t, &z, &[(j, -f64::from(entry))])?;
-        let jump: Vec<f64> = beyond
+        let jump: Row = beyond
             .iter()
             .zip(record.field[0])
             .map(|(far, near)| far - near)
             .collect();
-        let mut normal = vec![0.0; z.len()];
+        let mut normal = Row::from_elem(0.0, z.len());
         self.before.gradient(j, t, &z, &mut normal)?;
         let size = |v: &[f64]| v.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         if size(&jump) <= AT_SIDE * size(record.field[0]) {
@@ -189,7 +193,7 @@ impl<'a> Instant<'_, 'a> {
         }
         let reached = Cone {
             order: vec![j],
-            changes: vec![Change::normal_to(vec![normal], vec![jump])],
+            changes: smallvec![Change::normal_to(smallvec![normal], smallvec![jump])],
         };
         Ok(vec![missed, reached])
     }
@@ -209,8 +213,7 @@ impl<'a> Instant<'_, 'a> {
             return Ok(Vec::new());
         };
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
-        let (rows, _) =
-            map.derivative((t, record.x[0], record.discrete[0]), &self.extended.values)?;
+        let (rows, _) = map.derivative((t, record.x[0]), &self.extended.values)?;
         let place = self.before.at(t, &z);
         let mut by_state = vec![0.0; z.len()];
         let system = &self.extended.system;
@@ -232,7 +235,7 @@ impl<'a> Instant<'_, 'a> {
 }
 
 /// All orders of some surfaces.
-fn orders(surfaces: &[usize]) -> Vec<Vec<usize>> {
+pub(super) fn orders(surfaces: &[usize]) -> Vec<Vec<usize>> {
     if surfaces.len() <= 1 {
         return vec![surfaces.to_vec()];
     }

@@ -1,6 +1,8 @@
 //! Instants of all kinds, on the way forward and back.
 
-use super::change::matrices;
+use smallvec::SmallVec;
+
+use super::change::{matrices, Row};
 use super::forms::Second;
 use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, OneSided};
@@ -15,6 +17,9 @@ pub struct InstantDerivative {
     pub t: f64,
     /// The derivative of the time by each column; NaN where it is not known.
     pub dt: Vec<f64>,
+    /// Its mixed second derivatives by every pair of columns (a, b) with b <= a, in order; empty if they were not followed or are
+    /// not known.
+    pub second_dt: Vec<f64>,
     /// The saltation matrix, n rows of n entries.
     pub saltation: Vec<f64>,
     /// What parameters add to their own columns, n rows of one entry for each of them.
@@ -32,63 +37,87 @@ pub struct InstantDerivative {
 }
 
 impl InstantDerivative {
-    /// An instant at this time of which nothing is known.
-    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+    /// An instant at this time, to be filled.
+    fn new(t: f64) -> Self {
         InstantDerivative {
             t,
-            dt: vec![f64::NAN; n_columns],
-            saltation: vec![f64::NAN; n * n],
-            by_parameters: vec![f64::NAN; n * m],
+            dt: Vec::new(),
+            second_dt: Vec::new(),
+            saltation: Vec::new(),
+            by_parameters: Vec::new(),
             condition: f64::NAN,
             lost: None,
             sides: Vec::new(),
             square_root: Vec::new(),
         }
     }
+
+    /// An instant at this time of which nothing is known.
+    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+        InstantDerivative {
+            dt: vec![f64::NAN; n_columns],
+            saltation: vec![f64::NAN; n * n],
+            by_parameters: vec![f64::NAN; n * m],
+            ..InstantDerivative::new(t)
+        }
+    }
 }
 
 impl Instant<'_, '_> {
-    /// The derivatives of the instant, and the columns after it.
+    /// The derivatives of the instant, and the columns after it; one for each switch if different functions fix their times.
     pub(super) fn pass(
         &mut self,
         weights: &Weights,
         columns: &mut [Vec<f64>],
         second: &mut Option<Second>,
-    ) -> Result<InstantDerivative, FieldError> {
+    ) -> Result<Vec<InstantDerivative>, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
-        let Passage {
-            time,
-            changes,
-            goes_on,
-        } = match self.through(weights, &mut found.condition)? {
-            Ok(passage) => passage,
+        let mut condition = f64::NAN;
+        let passages = match self.through(weights, &mut condition)? {
+            Ok(passages) => passages,
             Err(lost) => {
-                found.lost = Some(lost);
+                let t = self.record.t[0];
+                let mut found = InstantDerivative::unknown(t, columns.len(), (n, m));
+                (found.condition, found.lost) = (condition, Some(lost));
                 self.add_sides(&mut found)?;
-                return Ok(found);
+                return Ok(vec![found]);
             }
         };
-        let dt = found.dt.iter_mut().zip(&*columns);
-        dt.for_each(|(dt, column)| *dt = dot(&time, column));
-        if let Some(pairs) = second.take() {
+        let mixed = second.take();
+        let mut second_dt = Vec::new();
+        if let ([passage], Some(pairs)) = (&passages[..], mixed) {
             let mut order = SecondOrder {
                 extended: self.extended,
                 record: self.record,
                 before: self.before,
                 after: self.after,
-                time: &time,
-                goes_on,
+                time: &passage.time,
+                goes_on: passage.goes_on,
             };
-            *second = order.pass(columns, &pairs)?;
+            if let Some((behind, times)) = order.pass(columns, &pairs)? {
+                *second = Some(behind);
+                second_dt = times;
+            }
         }
-        for column in columns.iter_mut() {
-            changes.iter().for_each(|one| one.apply(n, column));
+        let mut all = Vec::with_capacity(passages.len());
+        for passage in &passages {
+            let mut found = InstantDerivative::new(self.record.t[0]);
+            found.condition = condition;
+            found.second_dt.clone_from(&second_dt);
+            let dt = columns.iter().map(|column| dot(&passage.time, column));
+            found.dt.extend(dt);
+            for column in columns.iter_mut() {
+                passage.changes.iter().for_each(|one| one.apply(n, column));
+            }
+            (found.saltation, found.by_parameters) = matrices(&passage.changes, (n, m));
+            let is_finite = columns.iter().flatten().all(|v| v.is_finite());
+            found.lost = (!is_finite).then_some(Lost::NotFinite);
+            for _ in 1..passage.n_recorded {
+                all.push(found.clone());
+            }
+            all.push(found);
         }
-        (found.saltation, found.by_parameters) = matrices(&changes, (n, m));
-        let is_finite = columns.iter().flatten().all(|v| v.is_finite());
-        found.lost = (!is_finite).then_some(Lost::NotFinite);
-        Ok(found)
+        Ok(all)
     }
 
     /// Adds what is known of an instant without a derivative.
@@ -106,35 +135,40 @@ impl Instant<'_, '_> {
         Ok(())
     }
 
-    /// What the instant does, whatever its kind.
+    /// What the instant does, whatever its kind, one after the other if different functions fix the times.
     pub(super) fn through(
         &mut self,
         weights: &Weights,
         condition: &mut f64,
-    ) -> Result<Result<Passage, Lost>, FieldError> {
+    ) -> Result<Result<Vec<Passage>, Lost>, FieldError> {
         let sizes = (self.extended.n, self.extended.n_parameters());
+        if let Some(found) = self.in_parts(weights, condition)? {
+            return Ok(found);
+        }
         let lost = match self.passage(weights, condition)? {
             Err(lost) => lost,
-            found => return Ok(found),
+            Ok(found) => return Ok(Ok(vec![found])),
         };
         if lost == Lost::OneSided {
             if let Some(mut cones) = self.cones()?.filter(|cones| agree(cones, sizes)) {
                 if let Ok(time) = self.time(weights, condition)? {
-                    return Ok(Ok(Passage {
+                    return Ok(Ok(vec![Passage {
                         time,
                         changes: cones.swap_remove(0).changes,
                         goes_on: false,
-                    }));
+                        n_recorded: 0,
+                    }]));
                 }
             }
         }
         // Where the field is the same on both sides of a surface, a touch changes nothing.
         if lost == Lost::Grazing && self.touching()?.len() == 1 {
-            return Ok(Ok(Passage {
-                time: vec![f64::NAN; sizes.0 + sizes.1],
-                changes: Vec::new(),
+            return Ok(Ok(vec![Passage {
+                time: Row::from_elem(f64::NAN, sizes.0 + sizes.1),
+                changes: SmallVec::new(),
                 goes_on: true,
-            }));
+                n_recorded: 0,
+            }]));
         }
         Ok(Err(lost))
     }

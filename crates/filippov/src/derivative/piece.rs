@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use super::change::Change;
+use super::change::{Change, Row, Rows};
 use super::collocation::{operations, Collocation};
-use super::extended::{Column, Extended};
+use super::extended::Extended;
 use super::forms::{pairs, Second};
 use super::radau::NODES;
 use super::series::{ChangeSeries, Coefficients};
@@ -16,14 +16,13 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, Guard, Law, ModeField, SmoothField};
 use crate::options::{Options, SlidingRule};
-use crate::record::Gradient;
 use crate::sparse::SparseRows;
 use crate::stepper::Taylor;
 use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
     Setting, SignStructure, TracedSystem,
 };
-use crate::tolerances::{EPS, ROUNDING};
+use crate::tolerances::{AT_SIDE, EPS};
 use crate::vectors::dot;
 
 /// Series that allow less than this share of a step are not used where there is another way; where there is none, less than that.
@@ -79,6 +78,12 @@ impl<'a> Surroundings<'a> {
     }
 }
 
+/// The derivatives of a function that may fix the time of an instant: by the time, and by the extended state.
+pub(super) struct Timing {
+    pub time: f64,
+    pub state: Row,
+}
+
 /// A motion of the extended system in one mode.
 pub(super) struct Piece<'a> {
     pub extended: &'a Extended<'a>,
@@ -89,7 +94,7 @@ pub(super) struct Piece<'a> {
     /// The surfaces in contact.
     contacts: Vec<usize>,
     sides: Vec<i8>,
-    signs: Vec<f64>,
+    pub signs: Vec<f64>,
     pub field: ModeField<'a>,
     /// The derivatives of its field, if the graph has them.
     jacobian: Option<Arc<MotionJacobian>>,
@@ -169,7 +174,7 @@ impl<'a> Piece<'a> {
             collocation: Collocation::new((extended.n, extended.n_parameters()), around.rtol),
             nodes: Vec::new(),
             rates: vec![0.0; z.len()],
-            point: z,
+            point: z.into_vec(),
             sliding,
         }
     }
@@ -177,7 +182,14 @@ impl<'a> Piece<'a> {
     /// Does this motion have these mode and discrete states, in these surroundings?
     pub fn is_of(&self, around: &Surroundings, mode: &Mode, q: &[f64]) -> bool {
         let is_same = || self.contacts.is_empty() || self.sides == around.sides;
-        self.mode == *mode && self.q == q && is_same()
+        // Named discrete states are states here.
+        let n_named = self.extended.n_named;
+        self.mode == *mode && self.q[n_named..] == q[n_named..] && is_same()
+    }
+
+    /// How many dimensions the motion has lost: one for each surface slid on, two for each in contact.
+    pub fn codimension(&self) -> usize {
+        self.sliding.len() + 2 * self.contacts.len()
     }
 
     /// Are the derivatives of its multipliers known from the graph?
@@ -191,18 +203,28 @@ impl<'a> Piece<'a> {
     }
 
     /// The field of the extended system with the signs of the mode, and those given on the surfaces slid on.
-    pub fn corner(
-        &self,
-        t: f64,
-        z: &[f64],
-        signs: &[(usize, f64)],
-    ) -> Result<Vec<f64>, FieldError> {
-        let mut all = self.signs.clone();
+    pub fn corner(&self, t: f64, z: &[f64], signs: &[(usize, f64)]) -> Result<Row, FieldError> {
+        let mut all: SmallVec<[f64; 8]> = SmallVec::from_slice(&self.signs);
         signs.iter().for_each(|&(j, sign)| all[j] = sign);
-        let mut out = vec![0.0; z.len()];
+        let mut out = Row::from_elem(0.0, z.len());
         let place = Setting::new(&all, &self.q).at(t, z);
         self.extended.system.field(&place, &mut out)?;
         Ok(out)
+    }
+
+    /// The velocity of the motion.
+    pub fn rates(&mut self, t: f64, z: &[f64]) -> Result<Row, FieldError> {
+        let mut out = Row::from_elem(0.0, z.len());
+        let mut point = Row::from_slice(z);
+        self.field.eval_unprojected(t, &mut point, &mut out)?;
+        Ok(out)
+    }
+
+    /// The values of all switching functions.
+    pub fn surfaces(&self, t: f64, z: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut h = vec![0.0; self.extended.system.n_surfaces()];
+        self.extended.system.surfaces(&self.at(t, z), &mut h)?;
+        Ok(h)
     }
 
     /// Carries the derivative of the state, columns of n states with the shares of the parameters behind them, over a step along
@@ -438,7 +460,7 @@ impl<'a> Piece<'a> {
         j: usize,
         t: f64,
         z: &[f64],
-    ) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
+    ) -> Result<Option<(f64, Row)>, FieldError> {
         let place = self.sliding.iter().position(|&k| k == j);
         let (Some(place), Some(_)) = (place, &self.jacobian) else {
             return Ok(None);
@@ -454,12 +476,12 @@ impl<'a> Piece<'a> {
                 transposed[(column - size, c)] = value;
             }
         }
-        let mut unit = vec![0.0; l];
+        let mut unit = Vector::from_elem(0.0, l);
         unit[place] = 1.0;
         let Some(weights) = transposed.solve(&unit) else {
-            return Ok(Some((f64::NAN, vec![f64::NAN; size])));
+            return Ok(Some((f64::NAN, Row::from_elem(f64::NAN, size))));
         };
-        let (mut time, mut state) = (0.0, vec![0.0; size]);
+        let (mut time, mut state) = (0.0, Row::from_elem(0.0, size));
         for (c, weight) in weights.iter().enumerate() {
             time += weight * slopes.time()[size + c];
             for (column, value) in slopes.rows().row(size + c).filter(|(k, _)| *k < size) {
@@ -471,28 +493,57 @@ impl<'a> Piece<'a> {
 
     /// The derivatives of a guard by the time and by the extended state, in either sense: those of the switching function, or of the
     /// multiplier.
-    pub fn gradient_of(&mut self, guard: Guard, t: f64, z: &[f64]) -> Result<Gradient, FieldError> {
-        let mut state = vec![0.0; z.len()];
+    pub fn gradient_of(&mut self, guard: Guard, t: f64, z: &[f64]) -> Result<Timing, FieldError> {
+        let mut state = Row::from_elem(0.0, z.len());
         match guard {
             Guard::Surface(j) => {
                 let time = self.gradient(j, t, z, &mut state)?;
-                return Ok(Gradient { time, state });
+                return Ok(Timing { time, state });
             }
             Guard::Multiplier { surface, .. } if !self.extended.system.sticks_at(surface) => {
                 if let Some((time, state)) = self.multiplier_slopes(surface, t, z)? {
-                    return Ok(Gradient { time, state });
+                    return Ok(Timing { time, state });
                 }
             }
             _ => {}
         }
         let time = self.field.gradient_of(guard, t, z, &mut state)?;
-        Ok(Gradient { time, state })
+        Ok(Timing { time, state })
+    }
+
+    /// Does a multiplier stay at the end of its interval, to first order? A motion beside this one leaves on one side, and slides on the
+    /// other.
+    pub fn stays_at_an_end(&mut self, t: f64, z: &[f64]) -> Result<bool, FieldError> {
+        let field = self.rates(t, z)?;
+        let at_end = |l: &f64| (l.abs() - 1.0).abs() <= AT_SIDE;
+        let Some(k) = self.field.multipliers().iter().position(at_end) else {
+            return Ok(false);
+        };
+        let slopes = match self.sliding.get(k) {
+            Some(&j) => self.multiplier_slopes(j, t, z)?,
+            None => None,
+        };
+        let Some((by_time, slopes)) = slopes else {
+            return Ok(false);
+        };
+        let ends = |sign: f64| -> Result<Row, FieldError> {
+            let signs: Vec<_> = self.sliding.iter().map(|&j| (j, sign)).collect();
+            self.corner(t, z, &signs)
+        };
+        let (above, below) = (ends(1.0)?, ends(-1.0)?);
+        let speeds = above.iter().zip(&below).map(|(a, b)| a.abs().max(b.abs()));
+        let terms = slopes
+            .iter()
+            .zip(speeds)
+            .map(|(s, speed)| (s * speed).abs());
+        let size = by_time.abs() + terms.sum::<f64>();
+        Ok((by_time + dot(&slopes, &field)).abs() <= AT_SIDE * size)
     }
 
     /// The gradients of the surfaces slid on and of those in contact by the extended state.
-    pub fn normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
+    pub fn normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
         let gradient = |&j: &usize| {
-            let mut row = vec![0.0; z.len()];
+            let mut row = Row::from_elem(0.0, z.len());
             let place = self.at(t, z);
             self.extended.system.gradient(j, &place, &mut row)?;
             Ok(row)
@@ -504,39 +555,10 @@ impl<'a> Piece<'a> {
             .collect()
     }
 
-    /// The surfaces through a start that the motion leaves, where the field jumps, if one of these columns moves the start off them.
-    pub fn left_at_once(
-        &self,
-        t: f64,
-        z: &[f64],
-        kinds: &[Column],
-        columns: &[Vec<f64>],
-    ) -> Result<Vec<usize>, FieldError> {
-        let (system, place) = (&self.extended.system, self.at(t, z));
-        let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(&place, &mut h)?;
-        let (mut found, mut normal) = (Vec::new(), vec![0.0; z.len()]);
-        for (j, h) in h.iter().enumerate() {
-            let is_on_a_side = self.mode.entries()[j] != 0;
-            let is_there = is_on_a_side && h.abs() <= ROUNDING * system.surface_size(j, &place)?;
-            if is_there && system.jumps_across(j, &self.signs, &self.sliding) {
-                let by_time = system.gradient(j, &place, &mut normal)?;
-                let moves = |(kind, column): (&Column, &Vec<f64>)| {
-                    let later = f64::from(*kind == Column::Start);
-                    by_time * later + dot(&normal, column) != 0.0
-                };
-                if kinds.iter().zip(columns).any(moves) {
-                    found.push(j);
-                }
-            }
-        }
-        Ok(found)
-    }
-
     /// The gradients of the rates of the surfaces in contact.
-    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
+    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
         let gradient = |&j: &usize| {
-            let mut row = vec![0.0; z.len()];
+            let mut row = Row::from_elem(0.0, z.len());
             self.extended
                 .system
                 .rate_gradient(j, &self.at(t, z), &mut row)?;
@@ -562,15 +584,22 @@ impl<'a> Piece<'a> {
         t: f64,
         z: &[f64],
     ) -> Result<Option<Change>, FieldError> {
+        let mut surfaces = self.sliding.iter().chain(&self.contacts);
+        if surfaces.all(|j| kept.contains(j)) && self.contacts.is_empty() {
+            return Ok(None);
+        }
         let surfaces = self.sliding.iter().chain(&self.contacts);
         let normals = surfaces.zip(self.normals(t, z)?);
-        let mut normals: Vec<Vec<f64>> = normals
+        let mut normals: Rows = normals
             .filter(|(j, _)| !kept.contains(j))
             .map(|(_, normal)| normal)
             .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
-        let directions = normals.iter().map(|row| row[..n].to_vec()).collect();
+        let directions = normals
+            .iter()
+            .map(|row| Row::from_slice(&row[..n]))
+            .collect();
         Ok((!normals.is_empty()).then(|| Change::normal_to(normals, directions)))
     }
 }

@@ -25,12 +25,13 @@ pub(super) struct SecondOrder<'i, 'a> {
 }
 
 impl SecondOrder<'_, '_> {
-    /// The mixed derivatives behind the instant, from the columns before; `None` for instants of which they are not known.
+    /// The mixed derivatives behind the instant, from the columns before, and those of its time, NaN where a multiplier fixes that;
+    /// `None` for instants of which they are not known.
     pub fn pass(
         &mut self,
         columns: &[Vec<f64>],
         second: &Second,
-    ) -> Result<Option<Second>, FieldError> {
+    ) -> Result<Option<(Second, Vec<f64>)>, FieldError> {
         let (n, size) = (
             self.extended.n,
             self.extended.n + self.extended.n_parameters(),
@@ -43,10 +44,31 @@ impl SecondOrder<'_, '_> {
             return Ok(None);
         }
         let is_timed = self.time.iter().any(|v| *v != 0.0);
-        let surface = match record.guards {
+        let place = self.before.at(record.t[0], &z_before);
+        // The second derivative of what fixes the time, and its rate: the row of the time is minus its gradient over it.
+        let fixing = match record.guards {
             _ if self.goes_on => None,
-            [Guard::Surface(j)] => Some(*j),
+            [Guard::Surface(j)] => {
+                let mut normal = vec![0.0; size];
+                let by_time = self
+                    .before
+                    .gradient(*j, record.t[0], &z_before, &mut normal)?;
+                let rate = by_time + dot(&normal, &f_before);
+                match self.extended.form_of_surface(*j) {
+                    Ok(form) => Some((form, rate)),
+                    Err(_) => return Ok(None),
+                }
+            }
             [] if !is_timed => None,
+            [] => {
+                let mut acts = record.acts.iter();
+                let tick =
+                    acts.find_map(|act| self.extended.form_of_tick(act.index, &place).ok()?);
+                match tick {
+                    None => return Ok(None),
+                    known => known,
+                }
+            }
             _ => return Ok(None),
         };
         let moving = record
@@ -57,10 +79,6 @@ impl SecondOrder<'_, '_> {
         if moving.len() > 1 {
             return Ok(None);
         }
-        let form = surface.map(|j| self.extended.form_of_surface(j));
-        let Some(form) = form.map_or(Some(None), |form| form.ok().map(Some)) else {
-            return Ok(None);
-        };
         self.before.look_at(record.t[0], &z_before)?;
         self.after.look_at(record.t[1], &z_after)?;
         let (before, after) = (&*self.before, &*self.after);
@@ -71,16 +89,7 @@ impl SecondOrder<'_, '_> {
         };
         let own = along(before, &unit(1.0, &f_before));
         let next = along(after, &unit(1.0, &f_after));
-        // The rate of the guard: the row of the time is minus its gradient over it.
         let place = before.at(record.t[0], &z_before);
-        let rate = match surface {
-            None => f64::NAN,
-            Some(j) => {
-                let mut normal = vec![0.0; size];
-                let by_time = before.gradient(j, record.t[0], &z_before, &mut normal)?;
-                by_time + dot(&normal, &f_before)
-            }
-        };
         let map = match moving.first() {
             None => None,
             Some(act) => match self.extended.second_of_map(record.t[0], act)? {
@@ -109,6 +118,7 @@ impl SecondOrder<'_, '_> {
             })
             .collect();
         let mut found = Vec::with_capacity(second.pairs.len());
+        let mut times = Vec::with_capacity(second.pairs.len());
         for ((a, b), mixed) in pairs(columns.len()).zip(&second.pairs) {
             let (a, b) = (&firsts[a], &firsts[b]);
             let mut q = mixed.clone();
@@ -116,7 +126,7 @@ impl SecondOrder<'_, '_> {
             add(&mut q, b.tau, &a.along);
             add(&mut q, a.tau * b.tau, &own);
             let mut tau = 0.0;
-            if let Some(form) = &form {
+            if let Some((form, rate)) = &fixing {
                 let bend = form.at(&self.extended.system, &place, &a.w, &b.w)[0];
                 tau = dot(self.time, &q) - bend / rate;
                 add(&mut q, tau, record.field[0]);
@@ -132,6 +142,7 @@ impl SecondOrder<'_, '_> {
             add(&mut behind, -b.tau, &a.behind);
             add(&mut behind, a.tau * b.tau, &next);
             found.push(behind);
+            times.push(if self.goes_on { f64::NAN } else { tau });
         }
         let graph = self.extended.system.graph();
         let is_plane = |&j: &usize| graph.is_affine(graph.clone().surface(j as u32));
@@ -145,7 +156,7 @@ impl SecondOrder<'_, '_> {
             }
         }
         let is_finite = found.iter().flatten().all(|value| value.is_finite());
-        Ok(is_finite.then_some(Second { pairs: found }))
+        Ok(is_finite.then_some((Second { pairs: found }, times)))
     }
 }
 

@@ -101,20 +101,22 @@ impl ChangeSeries {
         {
             return None;
         }
-        room.end.resize(changes.len(), 0.0);
-        self.sum(&room.rows, dt, &mut room.end);
         // The two last terms are to be below the tolerance.
         let mut share = 1.0_f64;
         for block in 0..self.n_changes {
             let own = block * self.size..block * self.size + n;
-            let size = largest(&changes[own.clone()]).max(largest(&room.end[own.clone()]));
-            let bound = 0.5 * rtol * size;
+            // Not the size at the end: a series that is too long for a fast motion has an end beyond all bounds.
+            let term = |k: usize| {
+                let row = &room.rows[k * width + self.size..][own.clone()];
+                largest(row) * dt.powi(k as i32)
+            };
+            let size = (0..=self.order).map(term).find(|size| *size > 0.0);
+            let bound = 0.5 * rtol * size.unwrap_or(0.0);
             if !bound.is_finite() {
                 return None;
             }
             for k in [self.order - 1, self.order] {
-                let row = &room.rows[k * width + self.size..][own.clone()];
-                let term = largest(row) * dt.powi(k as i32);
+                let term = term(k);
                 if term > bound {
                     share = share.min((bound / term).powf(1.0 / k as f64));
                 }
@@ -124,9 +126,8 @@ impl ChangeSeries {
             return None;
         }
         let step = share * dt;
-        if share < 1.0 {
-            self.sum(&room.rows, step, &mut room.end);
-        }
+        room.end.resize(changes.len(), 0.0);
+        self.sum(&room.rows, step, &mut room.end);
         changes.copy_from_slice(&room.end);
         Some(dt - step)
     }

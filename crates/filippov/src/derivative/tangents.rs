@@ -1,17 +1,18 @@
 //! The derivatives of a run, as its observer.
 
+use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::instant::{arrival, Instant, Lost, Weights};
-use super::limit::{at_its_time, History, Past};
+use super::limit::History;
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
 use super::second::at_start;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::SmoothField;
 use crate::options::{Keep, Options};
-use crate::record::{InstantRecord, ObservedStep, Observer};
+use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer};
 use crate::system::Actions;
 use crate::vectors::dot;
 
@@ -33,9 +34,8 @@ pub struct Derivatives {
     pub second_lost: Option<f64>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
-    /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
-    /// side.
-    pub starts_on: Vec<usize>,
+    /// Where they are those of one side.
+    pub borders: Borders,
 }
 
 /// Follows the derivatives of a run, step by step and through its instants. Where they end they are NaN.
@@ -77,6 +77,8 @@ pub struct Tangents<'a> {
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
+    /// The same before an instant.
+    columns_before: Vec<Vec<f64>>,
     has_second: bool,
     /// The mixed derivatives, as long as they are known.
     second: Option<Second>,
@@ -84,7 +86,7 @@ pub struct Tangents<'a> {
     #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
-    has_started: bool,
+    t_start: Option<f64>,
     lost: Option<Lost>,
     found: Derivatives,
     raised: Option<FieldError>,
@@ -107,13 +109,14 @@ impl<'a> Tangents<'a> {
                 atol: options.atol.clone(),
             },
             columns: Vec::new(),
+            columns_before: Vec::new(),
             kept: options.keep,
             has_second: false,
             second: None,
             kinds,
             pieces: Vec::new(),
             history: History::default(),
-            has_started: false,
+            t_start: None,
             lost: None,
             found: Derivatives::default(),
             raised: None,
@@ -124,6 +127,13 @@ impl<'a> Tangents<'a> {
     #[must_use]
     pub fn with_second(mut self) -> Self {
         self.has_second = true;
+        self
+    }
+
+    /// Keeping this of the derivatives.
+    #[must_use]
+    pub(super) fn keeping(mut self, kept: Keep) -> Self {
+        self.kept = kept;
         self
     }
 
@@ -139,25 +149,25 @@ impl<'a> Tangents<'a> {
     }
 
     fn start(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) -> Result<(), FieldError> {
-        self.has_started = true;
+        self.t_start = Some(t);
         self.around.take_sides(mode);
-        let (n, m) = (self.around.extended.n, self.around.extended.n_parameters());
+        let n = self.around.extended.n;
         let z = self.around.extended.state(x);
         let mut piece = Piece::new(&self.around, mode, q);
-        let mut field = vec![0.0; n + m];
-        piece
-            .field
-            .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        let field = piece.rates(t, &z)?;
         if self.has_second {
             let at = (t, &z[..]);
             self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
         }
         self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
+        let starts_on = surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
             self.second = None;
             self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
         }
-        self.found.starts_on = piece.left_at_once(t, &z, &self.kinds, &self.columns)?;
+        let borders = &mut self.found.borders;
+        borders.starts_on = starts_on;
+        borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
@@ -220,46 +230,62 @@ impl<'a> Tangents<'a> {
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
-        let t0 = step.t_start();
-        if !self.has_started {
-            let mut x = vec![0.0; self.around.extended.n];
-            step.at(t0, &mut x);
-            self.start(t0, &x, step.mode, step.discrete)?;
+        self.follow_part(step, (step.t_start(), step.t_end), step.x_end)
+    }
+
+    /// Takes the columns of the start, if the step is the first one.
+    pub(super) fn begin(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
+        if self.t_start.is_some() {
+            return Ok(());
         }
+        let extended = self.around.extended;
+        let mut x = vec![0.0; extended.n];
+        extended.write_with_named(&mut x, step.discrete, |x| step.at(step.t_start(), x));
+        self.start(step.t_start(), &x, step.mode, step.discrete)
+    }
+
+    /// Follows the derivatives over a part of a step, at whose end the state is `x_end`.
+    pub(super) fn follow_part(
+        &mut self,
+        step: &ObservedStep,
+        (t0, t1): (f64, f64),
+        x_end: &[f64],
+    ) -> Result<(), FieldError> {
+        self.begin(step)?;
         if self.lost.is_none() {
             let mut piece = self.take_piece(step.mode, step.discrete);
+            let extended = self.around.extended;
             let along = |t: f64, x: &mut [f64]| {
-                step.at(t, x);
+                extended.write_with_named(x, step.discrete, |x| step.at(t, x));
                 Ok(())
             };
-            let span = (t0, step.t_end);
             if let Some(mut second) = self.second.take() {
-                if piece.advance_pairs(along, span, &self.columns, &mut second)? {
+                if piece.advance_pairs(along, (t0, t1), &self.columns, &mut second)? {
                     self.second = Some(second);
                 }
             }
-            piece.advance(along, span, &mut self.columns)?;
-            let z = self.around.extended.state(step.x_end);
-            piece.project(step.t_end, &z, &mut self.columns)?;
+            piece.advance(along, (t0, t1), &mut self.columns)?;
+            let z = extended.state(&extended.with_named(x_end, step.discrete));
+            piece.project(t1, &z, &mut self.columns)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
             }
         }
-        self.keep(step.t_end);
+        self.found.borders.ends_at_instant = false;
+        self.keep(t1);
         Ok(())
     }
 
-    fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
-        if !self.has_started {
+    pub(super) fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
+        if self.t_start.is_none() {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
-        let around = self.around.clone();
         let mut instant = Instant {
-            around: &around,
+            around: &self.around,
             extended: self.around.extended,
             record,
             before: &mut before,
@@ -270,16 +296,74 @@ impl<'a> Tangents<'a> {
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {
-            let columns = self.columns.clone();
-            let mut found = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
-            found.lost = self.lost.or(found.lost);
-            self.history.push(past(record, &columns, found.dt.clone()));
-            found.lost.into_iter().for_each(|lost| self.lose(lost));
-            self.keep_instant(found);
+            self.columns_before.clone_from(&self.columns);
+            let all = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
+            if let Some(last) = all.last() {
+                self.history.push(record, &self.columns_before, &last.dt);
+            }
+            let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
+            let mut pairs = self.columns_before.iter().zip(&self.columns).enumerate();
+            self.found.borders.ends_at_instant =
+                pairs.any(|(c, (before, after))| is_timed(c) && differ(before, after));
+            let start = self.t_start.unwrap_or(record.t[0]);
+            self.found.borders.starts_at_action |=
+                is_missed_later(self.around.extended, record, start, &self.kinds);
+            for mut found in all {
+                found.lost = self.lost.or(found.lost);
+                found.lost.into_iter().for_each(|lost| self.lose(lost));
+                self.keep_instant(found);
+            }
         }
         self.put_back(before);
         self.put_back(after);
         self.keep(record.t[1]);
+        Ok(())
+    }
+}
+
+/// What is needed where the columns are a basis that is changed on the way.
+impl Tangents<'_> {
+    /// The columns at this moment.
+    pub(super) fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+
+    /// Takes combinations of the columns in their place.
+    pub(super) fn change(&mut self, columns: Vec<Vec<f64>>, change: &[Vec<f64>]) {
+        self.columns = columns;
+        self.history.change(change);
+    }
+
+    /// Takes other columns; the instants so far are forgotten.
+    pub(super) fn replace(&mut self, columns: Vec<Vec<f64>>) {
+        self.columns = columns;
+        self.history.clear();
+    }
+
+    /// Why the derivatives are not known any more.
+    pub(super) fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// How many dimensions the motion in a mode has lost.
+    pub(super) fn codimension(&mut self, mode: &Mode, q: &[f64]) -> usize {
+        let piece = self.take_piece(mode, q);
+        let found = piece.codimension();
+        self.put_back(piece);
+        found
+    }
+
+    /// Takes from changes what leads off the surfaces of a mode.
+    pub(super) fn project(
+        &mut self,
+        (mode, q): (&Mode, &[f64]),
+        (t, x): (f64, &[f64]),
+        changes: &mut [Vec<f64>],
+    ) -> Result<(), FieldError> {
+        let piece = self.take_piece(mode, q);
+        let extended = self.around.extended;
+        piece.project(t, &extended.state(&extended.with_named(x, q)), changes)?;
+        self.put_back(piece);
         Ok(())
     }
 }
@@ -289,7 +373,7 @@ impl Tangents<'_> {
     fn jump(
         &mut self,
         record: &InstantRecord,
-        time: Option<Vec<f64>>,
+        time: Option<Row>,
         after: &Piece,
     ) -> Result<(), FieldError> {
         let extended = self.around.extended;
@@ -299,7 +383,7 @@ impl Tangents<'_> {
         let found = time.and_then(|time| {
             let dt: Vec<f64> = self.columns.iter().map(|c| dot(&time, c)).collect();
             last.dt.clone_from(&dt);
-            self.history.push(past(record, &self.columns, dt));
+            self.history.push(record, &self.columns, &dt);
             self.history.limit()
         });
         match found.filter(|_| self.lost.is_none()) {
@@ -325,18 +409,6 @@ impl Tangents<'_> {
     }
 }
 
-/// An instant as the limit of many sees it.
-fn past(record: &InstantRecord, columns: &[Vec<f64>], dt: Vec<f64>) -> Past {
-    Past {
-        t: record.t[0],
-        x: record.x[0].to_vec(),
-        guards: record.guards.into(),
-        mode: record.mode[0].clone(),
-        dx: at_its_time(columns, record.field[0], &dt),
-        dt,
-    }
-}
-
 impl Observer for Tangents<'_> {
     fn step(&mut self, step: &ObservedStep) {
         if self.raised.is_none() {
@@ -345,8 +417,15 @@ impl Observer for Tangents<'_> {
     }
 
     fn instant(&mut self, instant: &InstantRecord) {
-        if self.raised.is_none() {
-            self.raised = self.pass(instant).err();
+        if self.raised.is_some() {
+            return;
         }
+        self.raised = match self.around.extended.n_named {
+            0 => self.pass(instant).err(),
+            count => {
+                let kept = KeptInstant::with_discrete_as_states(instant, count);
+                self.pass(&kept.record()).err()
+            }
+        };
     }
 }

@@ -25,6 +25,12 @@ pub(crate) struct UserEvents<'a> {
     pub sides: Vec<f64>,
     /// The same of the step that is searched.
     pub found_sides: RefCell<Vec<f64>>,
+    /// Discrete states, as they were when the motion began.
+    q: Vec<f64>,
+    /// Do discrete states change at the end of the step that is searched, and no state?
+    pub ends_at_law: bool,
+    /// Have they changed where the motion began? Every function may have jumped there.
+    pub may_have_jumped: bool,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
     pub zeros: Vec<Vec<UserZero>>,
@@ -45,6 +51,9 @@ impl<'a> UserEvents<'a> {
             left: vec![f64::NAN; d],
             sides: vec![0.0; d],
             found_sides: RefCell::new(vec![0.0; d]),
+            q: Vec::new(),
+            ends_at_law: false,
+            may_have_jumped: false,
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
@@ -58,11 +67,15 @@ impl<'a> UserEvents<'a> {
         for (event, left) in self.events.iter().zip(&mut self.left) {
             *left = event.function.value(t, x, q)?;
         }
+        self.may_have_jumped = self.ends_at_law || self.q != q;
+        self.q.clear();
+        self.q.extend_from_slice(q);
         Ok(())
     }
 
     /// Keeps the signs that the search of the accepted step found.
     pub fn accept_sides(&mut self) {
+        self.may_have_jumped = false;
         self.sides.copy_from_slice(&self.found_sides.borrow());
     }
 

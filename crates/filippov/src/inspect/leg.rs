@@ -68,10 +68,13 @@ pub fn leg(
         .actions(actions)
         .held_in(mode)
         .solve_observed(&mut tangents, interrupt)?;
-    let mut derivative = tangents.finish()?.values;
-    let size = n * (n + extended.n_parameters());
-    derivative.drain(..derivative.len() - size);
-    let mut motion = HeldMotion::new(extended, &impacts, &options, mode, q);
+    let values = tangents.finish()?.values;
+    // Behind the states are the named discrete states, which rest.
+    let rows = extended.n_rows();
+    let last = values.len() - rows * (n + extended.n_parameters());
+    let columns = values[last..].chunks_exact(rows);
+    let derivative: Vec<f64> = columns.flat_map(|column| &column[..n]).copied().collect();
+    let mut motion = HeldMotion::new((system, extended), &impacts, &options, mode, q);
     let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut all = motion.velocity(t, x)?;
         all.truncate(n);

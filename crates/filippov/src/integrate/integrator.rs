@@ -23,10 +23,11 @@ use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::{Run, Slacks, SmoothField};
+use crate::motion::{Guard, Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
+use crate::system::Trigger;
 use crate::tolerances::{EPS, ROUNDING};
 
 /// An integration in progress.
@@ -299,6 +300,9 @@ impl<'a> Integrator<'a> {
         let last = self.horizon;
         let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
+        if !self.recorder.user_events.events.is_empty() {
+            self.recorder.user_events.ends_at_law = self.ends_at_law(found.as_ref(), t_stop);
+        }
         let (mut search, recorder) = self.step_search();
         let Some(zeros) = recorder.find_user_zeros(&mut search, theta, t_stop)? else {
             self.run.stats.reject(sliding);
@@ -379,6 +383,25 @@ impl<'a> Integrator<'a> {
         self.run.t = t_stop;
         self.control.switched();
         self.switch(&event)
+    }
+
+    /// Do discrete states change at the end of the step, and no state? A function of the user may jump there.
+    #[cold]
+    fn ends_at_law(&self, found: Option<&Found>, t_stop: f64) -> bool {
+        let triggers = self.run.motion.triggers(self.run.system);
+        let follows_law = |guard: &Guard| match guard {
+            Guard::Surface(j) => triggers.follows_law(*j),
+            _ => false,
+        };
+        if found.is_some_and(|event| event.guards.iter().any(follows_law)) {
+            return true;
+        }
+        let timed = self.run.actions.list.iter();
+        let mut timed = timed
+            .filter(|action| !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump));
+        t_stop >= self.horizon
+            && self.horizon < self.t_end
+            && timed.all(|action| !action.map.moves_state())
     }
 
     /// The search of the step that was computed; and the record of what it finds.

@@ -540,13 +540,6 @@ impl<'a> Integrator<'a> {
         if !due.is_empty() && !is_watched && self.run.t < self.t_end {
             if let Some(q) = quiet_change(&self.run, &due)? {
                 self.run.stats.n_surface_evaluations += 2;
-                if !self.recorder.user_events.events.is_empty() {
-                    let (t, x) = (self.run.t, &self.run.x);
-                    if let Some(stop) = self.recorder.zeros_before_jump(t, x) {
-                        return Ok(Some(stop));
-                    }
-                    self.recorder.jump(t, x);
-                }
                 self.control.forget_steps();
                 self.run.motion.set_discrete(q);
                 self.run.residuals.clear();
@@ -644,8 +637,11 @@ impl<'a> Integrator<'a> {
 
     /// Does these actions and those that they trigger, and goes on with the motion that follows.
     pub(super) fn act(&mut self, due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
-        if let Some(stop) = self.recorder.zeros_before_jump(self.run.t, &self.run.x) {
-            return Ok(Some(stop));
+        let moves_state = |index: &usize| self.run.actions.list[*index].map.moves_state();
+        if due.iter().any(moves_state) {
+            if let Some(stop) = self.recorder.zeros_before_jump(self.run.t, &self.run.x) {
+                return Ok(Some(stop));
+            }
         }
         let before = self.run.motion.mode.clone();
         let first = self.recorder.switches().len();
@@ -763,6 +759,7 @@ impl<'a> Integrator<'a> {
         } else {
             self.run.x = x;
             self.recorder.jump(self.run.t, &self.run.x);
+            self.recorder.user_events.forget_sides();
         }
         self.run.stats.n_switches += 1;
         let passed = match surfaces[..] {

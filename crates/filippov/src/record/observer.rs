@@ -117,6 +117,21 @@ impl KeptInstant {
         }
     }
 
+    /// With the first discrete states, so many of them, as further states that rest.
+    pub fn with_discrete_as_states(record: &InstantRecord, count: usize) -> Self {
+        let mut kept = KeptInstant::of(record);
+        for (x, q) in kept.x.iter_mut().zip(&kept.discrete) {
+            x.extend_from_slice(&q[..count]);
+        }
+        for field in &mut kept.field {
+            field.resize(field.len() + count, 0.0);
+        }
+        for act in &mut kept.acts {
+            act.x.extend_from_slice(&act.discrete[..count]);
+        }
+        kept
+    }
+
     /// The record.
     pub fn record(&self) -> InstantRecord<'_> {
         InstantRecord {

@@ -150,7 +150,6 @@ impl<'a> Recorder<'a> {
     /// The state just recorded has jumped: the limit from the right is kept.
     pub fn jump(&mut self, t: f64, y: &[f64]) {
         self.jump = Some((t, y.to_vec()));
-        self.user_events.forget_sides();
         if self.keeps_steps() {
             let start = self.y.len() - self.n;
             self.y[start..].copy_from_slice(y);

@@ -106,6 +106,7 @@ impl Rules {
             laws,
             n_hidden,
             sticking,
+            beside: Vec::new(),
         })
     }
 }

@@ -2,10 +2,12 @@
 //! compiled.
 
 use filippov_expr::container::{Container, Tag, Writer};
+use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Graph, Lengths, Names, Node, NodeId};
 
 use super::compiled::Follower;
-use super::laws::n_named;
+use super::laws::{n_named, Reader};
+use super::readers::readers;
 use super::{Law, Laws, PiecewiseSystem, Step, TracedSystem};
 use crate::error::Error;
 
@@ -54,6 +56,9 @@ pub struct Rules {
     pub n_hidden: usize,
     /// Surfaces with static friction above kinetic, and the ratios of the two.
     pub sticking: Vec<(usize, NodeId)>,
+    /// The laws that functions beside the field read, as events do; a run follows them as those of the field. They belong to
+    /// runs, and are not saved.
+    pub beside: Vec<usize>,
 }
 
 impl Definition {
@@ -71,6 +76,22 @@ impl Definition {
     pub fn n_parameters(&self) -> usize {
         let n_laws = self.rules.laws.len();
         self.names.parameters.len().saturating_sub(n_laws)
+    }
+
+    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign. The width `eps` becomes its last parameter.
+    /// It has no laws and no watched surfaces: the caller refuses systems that have any.
+    #[must_use]
+    pub fn regularized(&self, eps: &str, kappa: &[f64], ramp: Ramp) -> Self {
+        let mut names = self.names.clone();
+        let index = names.parameters.len() as u32;
+        names.parameters.push(eps.to_owned());
+        let (graph, field) = self.graph.regularized(&self.field, index, kappa, ramp);
+        Definition {
+            graph,
+            field,
+            names,
+            rules: Rules::default(),
+        }
     }
 
     /// How many surfaces a user sees. Those of laws come after them, and before these those that no motion crosses.
@@ -146,6 +167,9 @@ impl Definition {
                 return inconsistent("two ratios of static to kinetic friction on one surface");
             }
         }
+        for &law in &rules.beside {
+            check_index("law", law, rules.laws.len())?;
+        }
         (0..rules.laws.len()).try_for_each(|index| self.check_law(index))
     }
 
@@ -156,22 +180,46 @@ impl Definition {
     pub fn build(self, backend: Backend) -> Result<(TracedSystem, Laws), Error> {
         self.check()?;
         let zeros = vec![0.0; self.n_parameters()];
+        let readers = self.readers();
         let Rules {
             mut watched,
             laws,
             n_hidden,
             sticking,
+            beside: _,
         } = self.rules;
         let n_laws = laws.len();
         let followers = followers(&self.graph, &laws, zeros.len());
-        let laws = Laws::new(&self.graph, laws)?;
+        let idle = laws.iter().zip(&readers).filter_map(|(law, reader)| {
+            let guard = law.guard();
+            guard.filter(|_| *reader == Reader::Nobody)
+        });
+        let idle: Vec<usize> = idle.collect();
+        let laws = Laws::new(&self.graph, laws, readers)?;
         let system = TracedSystem::new(self.graph, self.field, zeros, self.names, backend)?;
         let n_surfaces = system.n_surfaces();
-        watched.extend(n_surfaces - n_hidden..n_surfaces);
+        let hidden = n_surfaces - n_hidden..n_surfaces;
+        watched.extend(hidden.filter(|surface| !idle.contains(surface)));
         let system = system
             .watching_with_followers(&watched, followers)
             .sticking(&sticking);
         Ok((system.with_discrete(n_laws), laws))
+    }
+
+    /// Who reads the discrete state of each law.
+    fn readers(&self) -> Vec<Reader> {
+        let rules = &self.rules;
+        let n_moving = self.graph.n_surfaces() - rules.n_hidden;
+        let surfaces = (0..n_moving).map(|j| self.graph.surface(j as u32));
+        let ratios = rules.sticking.iter().map(|&(_, ratio)| ratio);
+        let field = self.field.iter().copied();
+        readers(
+            &self.graph,
+            field.chain(surfaces).chain(ratios).collect(),
+            &rules.laws,
+            &rules.beside,
+            self.n_parameters(),
+        )
     }
 
     fn check_nodes(&self, nodes: &[NodeId]) -> Result<(), Error> {
@@ -289,7 +337,8 @@ fn check_sign(name: &'static str, value: f64) -> Result<(), Error> {
 fn followers(graph: &Graph, laws: &[Law], n_parameters: usize) -> Vec<Follower> {
     let may_end = |node: NodeId| graph.has_signs(node) || !graph.is_analytic(&[node]);
     let follower = |(index, law): (usize, &Law)| {
-        let (guard, argument) = (law.guard_without_memory(), law.nodes()[0]);
+        let guard = law.guard().filter(|_| !law.has_memory());
+        let argument = law.nodes()[0];
         let is_one = matches!(law, Law::Held { .. }) || guard.is_some() && may_end(argument);
         is_one.then_some(Follower {
             parameter: (n_parameters + index) as u32,

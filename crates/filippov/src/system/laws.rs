@@ -133,15 +133,17 @@ impl Law {
         }
     }
 
-    /// The surface at which the discrete state changes, if it is a function of the point: it need not be watched where
-    /// nothing reads it.
-    pub(crate) fn guard_without_memory(&self) -> Option<usize> {
+    /// Does the discrete state depend on the past, beside the point?
+    pub(crate) fn has_memory(&self) -> bool {
+        matches!(self, Law::Hysteresis { .. } | Law::Named { .. })
+    }
+
+    /// The surface at which the discrete state changes.
+    pub(crate) fn guard(&self) -> Option<usize> {
         match *self {
-            Law::Level { guard, .. } => Some(guard),
+            Law::Level { guard, .. } | Law::Hysteresis { guard, .. } => Some(guard),
             Law::Piece { guard, .. } => guard,
-            Law::Clock { .. } | Law::Held { .. } | Law::Hysteresis { .. } | Law::Named { .. } => {
-                None
-            }
+            Law::Clock { .. } | Law::Held { .. } | Law::Named { .. } => None,
         }
     }
 
@@ -167,6 +169,17 @@ impl Law {
     }
 }
 
+/// Who reads the discrete state of a law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reader {
+    /// The field, or a switching function.
+    System,
+    /// At most functions beside the field. A law with a memory is followed for these in any case.
+    Beside,
+    /// Nobody. The discrete state is a function of the point, so that a run need not change it.
+    Nobody,
+}
+
 /// The laws of a system, one per discrete state.
 #[derive(Debug)]
 pub struct Laws {
@@ -176,6 +189,8 @@ pub struct Laws {
     reads: Vec<Option<usize>>,
     /// So many of the first are named.
     n_named: usize,
+    /// Who reads the discrete states.
+    readers: Vec<Reader>,
 }
 
 /// What triggers a change of a discrete state, what it does, and how it is recorded.
@@ -186,7 +201,8 @@ pub struct LawAction {
     pub map: LawMap,
     /// The index of the discrete state.
     pub index: usize,
-    /// The kind of switch; none where only the way changes in which the same field is written.
+    /// The kind of switch; none where only the way changes in which the same field is written, or where the field does not
+    /// read the discrete state.
     pub kind: Option<Kind>,
 }
 
@@ -195,16 +211,20 @@ pub struct LawMap {
     laws: Arc<Laws>,
     parameters: Vec<f64>,
     index: usize,
-    /// What a clock adds.
-    step: f64,
+    /// What a law of the time alone follows.
+    ticking: Ticking,
 }
 
 impl Laws {
-    /// The laws of the discrete states of a graph, in their order.
+    /// The laws of the discrete states of a graph, in their order, and who reads these.
     ///
     /// # Errors
     /// If an expression cannot be compiled.
-    pub fn new(graph: &Graph, laws: Vec<Law>) -> Result<Self, ExprError> {
+    pub(super) fn new(
+        graph: &Graph,
+        laws: Vec<Law>,
+        readers: Vec<Reader>,
+    ) -> Result<Self, ExprError> {
         let mut graph = graph.clone();
         let expressions = laws.iter().flat_map(|law| law.expressions(&mut graph));
         let expressions: Vec<NodeId> = expressions.collect();
@@ -226,7 +246,17 @@ impl Laws {
             n_named: n_named(&laws),
             laws,
             program,
+            readers,
         })
+    }
+
+    /// The laws of the discrete states of a graph, in their order, all of which something reads.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn all_read(graph: &Graph, laws: Vec<Law>) -> Result<Self, ExprError> {
+        let readers = vec![Reader::System; laws.len()];
+        Laws::new(graph, laws, readers)
     }
 
     /// The laws.
@@ -239,10 +269,28 @@ impl Laws {
         self.n_named
     }
 
-    fn eval(&self, t: f64, x: &[f64], signs: &[f64], parameters: &[f64], q: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; 3 * self.laws.len()];
+    /// The indices of the laws that a run does not follow, since nobody reads their discrete states.
+    pub fn idle(&self) -> Vec<usize> {
+        let indices = 0..self.laws.len();
+        indices.filter(|&index| self.is_idle(index)).collect()
+    }
+
+    fn is_idle(&self, index: usize) -> bool {
+        self.readers[index] == Reader::Nobody
+    }
+
+    fn eval(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parameters: &[f64],
+        q: &[f64],
+    ) -> SmallVec<[f64; 16]> {
+        let mut out = SmallVec::from_elem(0.0, 3 * self.laws.len());
         if let Some(program) = &self.program {
-            let all: Vec<f64> = parameters.iter().chain(q).copied().collect();
+            let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(parameters);
+            all.extend_from_slice(q);
             program.eval(t, x, signs, &all, &[], &mut out);
         }
         out
@@ -254,16 +302,42 @@ impl Laws {
     /// If a function of the user raises.
     pub fn start(&self, system: &TracedSystem, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
         let mut q = vec![0.0; self.laws.len()];
-        if q.is_empty() {
-            return Ok(q);
+        let all: Vec<usize> = (0..q.len()).collect();
+        self.settle(system, (t, x), &all, &mut q)?;
+        Ok(q)
+    }
+
+    /// Brings the discrete states that a run does not follow up to date with a point of it.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn follow_idle(
+        &self,
+        system: &TracedSystem,
+        (t, x): (f64, &[f64]),
+        q: &mut [f64],
+    ) -> Result<(), FieldError> {
+        self.settle(system, (t, x), &self.idle(), q)
+    }
+
+    /// Sets some discrete states to what they are at a start at (t, x).
+    fn settle(
+        &self,
+        system: &TracedSystem,
+        (t, x): (f64, &[f64]),
+        indices: &[usize],
+        q: &mut [f64],
+    ) -> Result<(), FieldError> {
+        if indices.is_empty() {
+            return Ok(());
         }
         let mut signs = vec![1.0; system.n_surfaces()];
         let mut h = signs.clone();
         // Expressions may contain discrete states and signs of others.
         for _ in 0..=q.len() + signs.len() {
-            let before = (q.clone(), signs.clone());
-            for index in 0..q.len() {
-                let out = self.eval(t, x, &signs, system.parameters(), &q);
+            let before = (q.to_vec(), signs.clone());
+            for &index in indices {
+                let out = self.eval(t, x, &signs, system.parameters(), q);
                 let values = [out[3 * index], out[3 * index + 1], out[3 * index + 2]];
                 q[index] = match &self.laws[index] {
                     Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
@@ -277,14 +351,14 @@ impl Laws {
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
-            system.surfaces(&Setting::new(&signs, &q).at(t, x), &mut h)?;
+            system.surfaces(&Setting::new(&signs, q).at(t, x), &mut h)?;
             let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
             signs = sides.collect();
-            if before == (q.clone(), signs.clone()) {
+            if before.0 == q && before.1 == signs {
                 break;
             }
         }
-        Ok(q)
+        Ok(())
     }
 
     /// The actions that change the discrete states in a run with these parameters.
@@ -297,9 +371,11 @@ impl Laws {
         };
         let follows_jumps =
             |(index, law): (usize, &Law)| matches!(law, Law::Held { .. }) && !follows_law(index);
-        let first_held = self.laws.iter().enumerate().position(follows_jumps);
-        for (index, law) in self.laws.iter().enumerate() {
-            let mut step = 0.0;
+        let followed = || (0..self.laws.len()).filter(|&index| !self.is_idle(index));
+        let first_held = followed().find(|&index| follows_jumps((index, &self.laws[index])));
+        for index in followed() {
+            let law = &self.laws[index];
+            let mut ticking = Ticking::default();
             let (trigger, kind) = match *law {
                 Law::Named { .. } => continue,
                 // One action brings all of them up to date.
@@ -311,15 +387,14 @@ impl Laws {
                     guard: Some(guard), ..
                 } => (falling(guard), None),
                 Law::Piece { ref knots, .. } => {
-                    let ticking = self.ticking(index, n_states, parameters);
+                    ticking = self.ticking(index, n_states, parameters);
                     (Trigger::Times(ticking.times(knots)), None)
                 }
                 Law::Clock { .. } => {
-                    let ticking = self.ticking(index, n_states, parameters);
+                    ticking = self.ticking(index, n_states, parameters);
                     let Some(clock) = ticking.clock() else {
                         continue;
                     };
-                    step = ticking.rate.signum();
                     let trigger = Trigger::Clock {
                         clock,
                         at_start: false,
@@ -329,13 +404,14 @@ impl Laws {
                 Law::Level { guard, .. } => (falling(guard), None),
                 Law::Hysteresis { guard, .. } => (falling(guard), Some(Kind::Reset)),
             };
+            let kind = kind.filter(|_| self.readers[index] == Reader::System);
             actions.push(LawAction {
                 trigger,
                 map: LawMap {
                     laws: Arc::clone(self),
                     parameters: parameters.to_vec(),
                     index,
-                    step,
+                    ticking,
                 },
                 index,
                 kind,
@@ -361,7 +437,7 @@ impl Laws {
 }
 
 /// The function offset + rate t, whose floor is wanted.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Ticking {
     offset: f64,
     rate: f64,
@@ -406,6 +482,19 @@ pub(crate) fn n_named(laws: &[Law]) -> usize {
 fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
     let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
     knots.partition_point(|&knot| knot <= g + beside) as f64
+}
+
+/// The same, looked for at the knot behind `before` first.
+fn passed_from(knots: &[f64], before: f64, g: f64, rate: f64) -> f64 {
+    let next = before + if rate < 0.0 { -1.0 } else { 1.0 };
+    let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    let is_passed = |place: usize| knots.get(place).is_some_and(|&knot| knot <= g + beside);
+    let is_next =
+        next >= 0.0 && !is_passed(next as usize) && (next == 0.0 || is_passed(next as usize - 1));
+    match is_next {
+        true => next,
+        false => passed(knots, g, rate),
+    }
 }
 
 /// The piece that g has come to from `piece`: at an end of it the one beyond.
@@ -473,16 +562,18 @@ impl ActionMap for LawMap {
     fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let index = self.index;
         match &self.laws.laws[index] {
-            Law::Clock { .. } => q[index] += self.step,
+            Law::Clock { .. } => q[index] += self.ticking.rate.signum(),
             Law::Hysteresis { .. } => q[index] = -q[index],
             Law::Held { .. } | Law::Named { .. } => {}
-            Law::Piece { knots, guard, .. } => {
+            Law::Piece {
+                knots, guard: None, ..
+            } => {
+                let Ticking { offset, rate } = self.ticking;
+                q[index] = passed_from(knots, q[index], offset + rate * t, rate);
+            }
+            Law::Piece { knots, .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
-                let g = out[3 * index];
-                q[index] = match guard {
-                    Some(_) => piece_beyond(knots, q[index], g),
-                    None => passed(knots, g, out[3 * index + 1]),
-                };
+                q[index] = piece_beyond(knots, q[index], out[3 * index]);
             }
             Law::Level { .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
@@ -527,6 +618,9 @@ impl LawMap {
             let Law::Held { step, .. } = law else {
                 continue;
             };
+            if self.laws.is_idle(k) {
+                continue;
+            }
             let discrete = self.laws.reads[k].and_then(|p| p.checked_sub(self.parameters.len()));
             let value = match discrete {
                 Some(read) => q[read],

@@ -28,6 +28,7 @@ mod linearisation;
 mod linearisations;
 mod map;
 mod place;
+mod readers;
 mod reduction;
 mod sign_structure;
 mod taylor_series;

@@ -19,6 +19,10 @@ pub const EPS: f64 = f64::EPSILON;
 /// state plus that of a few operations. Also the shortest step in units of the time: its ends are told apart.
 pub const ROUNDING: f64 = 16.0 * EPS;
 
+/// Where sliding, a contact or a map takes directions from a basis, one is gone if its length is below this fraction of that of the
+/// longest: what is left of it is the rounding of products with matrices whose entries are up to some thousands.
+pub const GONE: f64 = 1e-12;
+
 /// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
 /// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
 /// some thousands through the derivatives; a genuine value this small would be

@@ -44,6 +44,8 @@ struct Cuts {
     start: Signs,
     /// (theta, index of the sign, sign after), in order of theta.
     changes: SmallVec<[(f64, usize, f64); 4]>,
+    /// May the function jump at the end of the step, with discrete states? The next step tells.
+    ends_with_one: bool,
 }
 
 impl Cuts {
@@ -80,6 +82,8 @@ struct AtStart {
     before: f64,
     /// The function is zero there, and it has been said.
     is_known_zero: bool,
+    /// May the function, smooth as it is, have jumped there?
+    may_have_jumped: bool,
 }
 
 impl StepSearch<'_, '_> {
@@ -152,6 +156,7 @@ impl StepSearch<'_, '_> {
         let mut start = AtStart {
             before: side(left),
             is_known_zero: left == 0.0 || was_zero,
+            may_have_jumped: false,
         };
         let Some(parts) = function.parts() else {
             let along = Source::Sampled(function);
@@ -159,13 +164,11 @@ impl StepSearch<'_, '_> {
             return Ok(changes.map(|found| found.0));
         };
         let mut cuts = Cuts::none(parts.n_inner());
-        if parts.n_inner() > 0 {
-            // At a kink or a jump rounding decides what the value there is: what counts is the piece before.
+        start.may_have_jumped = events.may_have_jumped;
+        if parts.n_inner() > 0 || events.may_have_jumped {
+            // At a kink or a jump rounding decides what the value there is: what counts is the piece before, if there is one.
             start.is_known_zero = was_zero;
-            start.before = match events.sides[index] {
-                0.0 => sign_of(left),
-                side => side,
-            };
+            start.before = events.sides[index];
         }
         for part in 0..parts.n_inner() {
             if !self.add_cuts(parts, part, &mut cuts, theta)? {
@@ -173,6 +176,7 @@ impl StepSearch<'_, '_> {
             }
         }
         let whole = Source::Part(parts, parts.n_inner());
+        cuts.ends_with_one = events.ends_at_law;
         let changes = self.changes_along(whole, &cuts, theta, start)?;
         if let Some((_, side)) = &changes {
             events.found_sides.borrow_mut()[index] = *side;
@@ -193,6 +197,7 @@ impl StepSearch<'_, '_> {
         let nothing = AtStart {
             before: 0.0,
             is_known_zero: false,
+            may_have_jumped: false,
         };
         let mut ignored = Vec::new();
         let along = Along::new(source, &cuts.start, self);
@@ -201,6 +206,7 @@ impl StepSearch<'_, '_> {
         let known = AtStart {
             before: start.sign,
             is_known_zero: start.divided,
+            may_have_jumped: false,
         };
         let Some((changes, _)) = self.changes_along(source, cuts, theta, known)? else {
             return Ok(false);
@@ -261,7 +267,7 @@ impl StepSearch<'_, '_> {
         for to in cuts.ends(theta) {
             let signs = cuts.signs_behind(from);
             let along = Along::new(source, &signs, self);
-            let mut start = match along.is_smooth() {
+            let mut start = match along.is_smooth() && !before.may_have_jumped {
                 true => Start {
                     from,
                     divided: before.is_known_zero,
@@ -269,13 +275,14 @@ impl StepSearch<'_, '_> {
                 },
                 false => self.enter(&along, (from, to), before, &mut changes)?,
             };
-            let kink = to < theta || cuts.has_change_from(theta - together);
+            let kink = to < theta || cuts.ends_with_one || cuts.has_change_from(theta - together);
             if !self.search_piece_of(&along, &mut start, (to, theta, kink), &mut changes)? {
                 return Ok(None);
             }
             before = AtStart {
                 before: start.sign,
                 is_known_zero: false,
+                may_have_jumped: false,
             };
             from = to;
         }
@@ -437,6 +444,7 @@ impl Cuts {
         Cuts {
             start: smallvec![0.0; n],
             changes: SmallVec::new(),
+            ends_with_one: false,
         }
     }
 }

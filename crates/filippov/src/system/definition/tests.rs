@@ -1,8 +1,10 @@
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
+
 use super::{Definition, Rules};
 use crate::{Error, Law, Step};
-use filippov_expr::{Graph, Names, NodeId};
+use filippov_expr::{Backend, Graph, Names, NodeId};
 
 /// x' = -sign(x) + p + q with a discrete state q; node 1 is the time.
 fn relay() -> Definition {
@@ -122,6 +124,26 @@ fn laws_are_what_they_say() {
         "surface 5 does not exist: the system has 1"
     );
     assert_eq!(hysteresis(0.5, 0), "initial = 0.5: must be +1 or -1");
+}
+
+#[test]
+fn laws_that_nothing_reads_are_not_followed() {
+    let n_followed = |definition: Definition| {
+        let (_, laws) = definition.build(Backend::Interpreter).unwrap();
+        Arc::new(laws).actions(1, &[0.0]).len()
+    };
+    assert_eq!(n_followed(relay()), 1);
+    let mut unread = relay();
+    let p = unread.graph.parameter(0);
+    unread.field = vec![p];
+    assert_eq!(n_followed(unread.clone()), 0);
+    // An event reads it: it is followed, and is no switch.
+    unread.rules.beside = vec![0];
+    let (_, laws) = unread.clone().build(Backend::Interpreter).unwrap();
+    let actions = Arc::new(laws).actions(1, &[0.0]);
+    assert!(matches!(&actions[..], [action] if action.kind.is_none()));
+    unread.rules.beside = vec![1];
+    assert!(unread.check().is_err());
 }
 
 #[test]

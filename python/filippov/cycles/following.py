@@ -1,7 +1,7 @@
 """Branches of cycles and equilibria in a parameter, through the points at which their itinerary changes.
 
-References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10; Thota, Dankowicz, SIAM J.
-Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
+References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10;
+Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
-from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.indicators import tests_at
 from filippov.cycles.itinerary import Itinerary
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
-from filippov.cycles.tests import tests_at
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import count, positive
@@ -31,8 +31,6 @@ __all__ = ["at_value", "continuation"]
 AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
-# Codes at which the flow takes another itinerary.
-_CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 _WIDTH = 1e-13
 _SAVED_EVERY = 50
 
@@ -85,14 +83,14 @@ def continuation(
     step : float, optional
         First step, in units of the parameter. Default: a hundredth of the range. It adapts.
     monitor : dict, optional
-        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a period; or a
-        function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values along the branch are
-        kept, and their zeros are special points UZ.
+        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a
+        period; or a function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values
+        along the branch are kept, and their zeros are special points UZ.
     detect : "all" or sequence of str, optional
         Codes of the special points to look for.
     switch : {"follow", "stop", "ignore"}, optional
-        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that the flow
-        does not follow.
+        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that
+        the flow does not follow.
     max_points : int, optional
         The most points in each direction.
     store : path, optional
@@ -115,7 +113,7 @@ def continuation(
     --------
     >>> import numpy as np, filippov as fl
     >>> fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.2 * x[0] * (x[0] > a)], n=1)
-    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.0))
+    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.2))
     >>> [(point.code, round(point.params["a"], 9)) for point in branch.special["BE"]]
     [('BE', 0.8), ('BE', 1.0)]
     """
@@ -252,7 +250,7 @@ class _Side:
     def _begin(self, state: State, direction: float) -> None:
         """Start with the itinerary of a state."""
         self.curve, self.w = curve_of(state, (self.settings.name,), (self.settings.size,))
-        residual, jacobian = self.curve.equations(self.w)
+        _, jacobian = self.curve.equations(self.w)
         scale = self.curve.scales(self.w)
         self.tangent = tangent_of(jacobian, scale)
         if self.tangent[-1] * direction < 0:
@@ -341,7 +339,7 @@ class _Side:
         for _, key, located in found:
             code = key[0]
             state = self.curve.state(located.w, located.error)
-            if code in _CHANGES and self.settings.switch != "ignore":
+            if code in CHANGES and self.settings.switch != "ignore":
                 if self.tests[key] < 0:
                     continue  # it becomes possible again: the flow does not follow it yet
                 self._add_located(key, state)
@@ -363,8 +361,8 @@ class _Side:
     def _located(self, key: Any, step: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
         """Return how far along the step a test function vanishes, which one, and the point."""
         scale = self.curve.scales(self.w)
-        start, level = self.w, self.w / scale @ self.tangent
-        length = step.w / scale @ self.tangent - level
+        start, level = self.w, float(self.w / scale @ self.tangent)
+        length = float(step.w / scale @ self.tangent) - level
         nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
@@ -380,7 +378,7 @@ class _Side:
             zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
-            if key[0] in _CHANGES or not nearest:
+            if key[0] in CHANGES or not nearest:
                 raise
         _, s, point = nearest[0]
         return s, key, point
@@ -412,7 +410,7 @@ class _Side:
         if code not in self.settings.detect:
             return
         surface, t = "", np.nan
-        if code in _CHANGES and key is not None:
+        if code in CHANGES and key is not None:
             place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
             names = (
                 self.curve.shooting.motions.prepared.surfaces
@@ -480,7 +478,7 @@ class _Side:
         return None
 
     def _locate_behind(self, state: Cycle, value: float, direction: float) -> None:
-        """Go back from a cycle to the value of the parameter before, and find which test function vanishes."""
+        """Go back from a cycle to a value of the parameter, and find which test function vanishes between."""
         self._begin(state, -direction)
         self.points.pop()
         start = (self.w, self.tangent, self.tests, self.jacobian)
@@ -497,7 +495,7 @@ class _Side:
         lost = [
             key
             for key in tests
-            if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
+            if key[0] in CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
         ]
         if not lost:
             raise ModelError("nothing vanishes between the two itineraries")

@@ -1,9 +1,10 @@
 """Equilibria of regions, and pseudo-equilibria on any number of surfaces, where the sliding motion rests.
 
-A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of them: these equations are
-regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
+A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of
+them: these equations are regular where a multiplier is -1 or +1, and the equilibrium is one of a region.
 
-References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003)
+2157.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class Equilibrium:
 
     @cached_property
     def switching(self) -> Array:
-        """The values of the switching functions, each in the sense of the mode: positive if it is admissible."""
+        """The switching functions, each in the sense of the mode: positive where it is admissible."""
         return self._curve.switching(self._w)
 
     @property
@@ -79,7 +80,7 @@ class Equilibrium:
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
-        """Those of the motion in its mode: n in a region, n - m on m surfaces; the largest real part first."""
+        """Those of its motion: n in a region, n - m on m surfaces; the largest real part first."""
         found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
         return found[np.lexsort((-found.imag, -found.real))]
 
@@ -193,21 +194,19 @@ class EquilibriumCurve:
         jacobian = self._by_unknowns(w)
         a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
         if m == 0:
-            return a
-        tangents = self.tangents(w)
+            return np.asarray(a)
+        tangents = _tangents(rows)
         # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
         by_state = -np.linalg.solve(rows @ b, rows @ a)
         return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
 
     def tangents(self, w: Array) -> Array:
         """Return the basis, shape (n, n - m), of the tangent space that `linearisation` is in."""
-        if not self.sliding:
-            return np.eye(self.n)
-        return np.asarray(np.linalg.svd(self.normals(w))[2][len(self.sliding) :].T)
+        return _tangents(self.normals(w))
 
     def normals(self, w: Array) -> Array:
         """Return the gradients of the surfaces slid on, shape (m, n)."""
-        return self._by_unknowns(w)[self.n :, : self.n]
+        return np.asarray(self._by_unknowns(w)[self.n :, : self.n])
 
     def normal_rates(self, w: Array) -> Array:
         """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
@@ -231,6 +230,14 @@ class EquilibriumCurve:
         return Equilibrium(self, w, error)
 
 
+def _tangents(rows: Array) -> Array:
+    """Return a basis of the space that the gradients are at right angles to, shape (n, n - m)."""
+    m, n = rows.shape
+    if m == 0:
+        return np.eye(n)
+    return np.asarray(np.linalg.svd(rows)[2][m:].T)
+
+
 def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False) -> Array:
     """Return the derivative of a smooth function, by central differences of second or sixth order."""
     columns = []
@@ -249,7 +256,7 @@ def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_f
             columns.append((at(1) - at(-1)) / (2 * d))
     if not columns:
         return np.zeros((len(function(w)), 0))
-    return np.array(columns).T
+    return np.asarray(np.array(columns).T, dtype=np.float64)
 
 
 def equilibrium(
@@ -318,6 +325,8 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
     for _ in range(_MOST_STEPS):
         residual, jacobian = curve.equations(w)
         own = jacobian[:, : curve.n_unknowns]
+        if not (np.isfinite(residual).all() and np.isfinite(own).all()):
+            break
         change = -np.linalg.lstsq(own, residual, rcond=None)[0]
         size = float(np.max(np.abs(change) / curve.scales(w)[: curve.n_unknowns]))
         if not np.isfinite(size):

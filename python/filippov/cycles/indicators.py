@@ -12,9 +12,9 @@ import numpy as np
 
 from filippov.cycles.cycle import multipliers_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import EquilibriumCurve
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
+from filippov.cycles.rest import EquilibriumCurve
 from filippov.cycles.shooting import Shot
 
 __all__ = ["singular_values_of", "tests_at"]
@@ -43,7 +43,7 @@ def tests_at(
 
 
 def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[Any, float]:
-    """Return the functions of multipliers or eigenvalues that vanish at special points, and those of boundaries."""
+    """Return the functions of multipliers or eigenvalues, and those of boundaries."""
     if isinstance(curve, CycleCurve):
         return _of_multipliers(curve, curve.shot(w))
     return _of_equilibrium(curve, w)

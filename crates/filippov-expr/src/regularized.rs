@@ -1,0 +1,113 @@
+//! Expressions with functions in the place of signs: the regularised system of a piecewise-smooth one.
+
+use rustc_hash::FxHashMap;
+
+use crate::graph::Graph;
+use crate::node::{Node, NodeId};
+use crate::op::UnaryOp;
+use crate::switching::Switching;
+
+/// The function that takes the place of a sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ramp {
+    /// `tanh(u)`.
+    Tanh,
+    /// `clip(u, -1, 1)`.
+    Linear,
+}
+
+impl Graph {
+    /// A new graph with these values in which the sign of every surface j is a function of `kappa[j] * h_j / eps`. A select
+    /// becomes the combination of its branches with the weights (1 +- s) / 2.
+    ///
+    /// `eps` is the parameter with this index. Only a linear ramp leaves surfaces, where it bends.
+    ///
+    /// # Example
+    /// ```
+    /// use filippov_expr::{regularized::Ramp, Graph, Names};
+    /// let mut g = Graph::new();
+    /// let v = g.state(0);
+    /// let sign = g.sign(v);
+    /// let (smooth, values) = g.regularized(&[sign], 0, &[2.0], Ramp::Tanh);
+    /// assert_eq!(smooth.text(values[0], &Names::default()), "tanh(2*x[0]/p[0])");
+    /// assert_eq!(smooth.n_surfaces(), 0);
+    /// ```
+    pub fn regularized(
+        &self,
+        roots: &[NodeId],
+        eps: u32,
+        kappa: &[f64],
+        ramp: Ramp,
+    ) -> (Graph, Vec<NodeId>) {
+        let mut graph = Graph::new();
+        let eps = graph.parameter(eps);
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        let mut signs: FxHashMap<u32, NodeId> = FxHashMap::default();
+        // A switching function may have a larger number than the sign that it decides.
+        let mut pending = roots.to_vec();
+        while let Some(&id) = pending.last() {
+            let node = *self.node(id);
+            let function = node.surface().map(|j| self.surface(j));
+            let missing: Vec<NodeId> = node
+                .operands()
+                .chain(function)
+                .filter(|operand| !image.contains_key(operand))
+                .collect();
+            if !missing.is_empty() {
+                pending.extend(missing);
+                continue;
+            }
+            pending.pop();
+            let sign = node.surface().map(|j| {
+                *signs.entry(j).or_insert_with(|| {
+                    let factor = graph.constant(kappa[j as usize]);
+                    let scaled = graph.mul(factor, image[&self.surface(j)]);
+                    let u = graph.div(scaled, eps);
+                    graph.ramp(u, ramp)
+                })
+            });
+            let new = match (node, sign) {
+                (Node::Select { plus, minus, .. }, Some(sign)) => {
+                    graph.between(sign, image[&plus], image[&minus])
+                }
+                (_, Some(sign)) => sign,
+                (Node::Unary(op, a), _) => graph.unary(op, image[&a]),
+                (Node::Binary(op, a, b), _) => graph.binary(op, image[&a], image[&b]),
+                _ => graph.insert(node),
+            };
+            image.insert(id, new);
+        }
+        let values = roots.iter().map(|root| image[root]).collect();
+        (graph, values)
+    }
+
+    fn ramp(&mut self, u: NodeId, ramp: Ramp) -> NodeId {
+        match ramp {
+            Ramp::Tanh => self.unary(UnaryOp::Tanh, u),
+            Ramp::Linear => {
+                let (one, minus_one) = (self.constant(1.0), self.constant(-1.0));
+                let above = self.maximum(u, minus_one);
+                // Not the minimum of that and 1: this would be a surface made of another one.
+                let beyond = self.sub(u, one);
+                match self.switch(beyond) {
+                    Switching::Constant(sign) if sign > 0.0 => one,
+                    Switching::Constant(_) => above,
+                    Switching::Surface { index, orientation } => {
+                        self.select(index, orientation, one, above)
+                    }
+                }
+            }
+        }
+    }
+
+    /// `minus` at the sign -1, `plus` at +1, and on the straight line between them.
+    pub fn between(&mut self, sign: NodeId, plus: NodeId, minus: NodeId) -> NodeId {
+        let half = self.constant(0.5);
+        let sum = self.add(plus, minus);
+        let mean = self.mul(half, sum);
+        let difference = self.sub(plus, minus);
+        let radius = self.mul(half, difference);
+        let change = self.mul(sign, radius);
+        self.add(mean, change)
+    }
+}

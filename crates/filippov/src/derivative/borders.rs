@@ -1,0 +1,176 @@
+//! Where a run begins or ends at something that a changed run misses.
+
+use super::extended::{Column, Extended};
+use super::piece::{Piece, Surroundings};
+use crate::error::FieldError;
+use crate::record::InstantRecord;
+use crate::system::{LieDerivatives, PiecewiseSystem, SignStructure};
+use crate::tolerances::{AT_SIDE, ROUNDING};
+use crate::vectors::dot;
+
+/// Why derivatives are those of one side: what the start or the end of a run coincides with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Borders {
+    /// Surfaces on which the run starts and at which the sides differ: derivatives by the start.
+    pub starts_on: Vec<usize>,
+    /// An action at the initial time, which a run that begins later misses: derivatives by the initial time.
+    pub starts_at_action: bool,
+    /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
+    pub starts_at_tick: bool,
+    /// The last instant is at the end, and a changed run has it later: all derivatives there.
+    pub ends_at_instant: bool,
+}
+
+impl Borders {
+    /// Are derivatives those of both sides?
+    pub fn is_empty(&self) -> bool {
+        *self == Borders::default()
+    }
+}
+
+/// Does an instant at the initial time, from which a run by these columns begins, do something that one which begins later misses?
+pub(super) fn is_missed_later(
+    extended: &Extended,
+    record: &InstantRecord,
+    start: f64,
+    kinds: &[Column],
+) -> bool {
+    let mut acts = record.acts.iter();
+    let changes = acts.any(|act| extended.moves(act.index)) || record.field[0] != record.field[1];
+    record.t[0] == start && !record.acts.is_empty() && changes && kinds.contains(&Column::Start)
+}
+
+/// The surfaces through a start at which the sides differ, if one of these columns, as they are before the motion acts on them, moves
+/// the start off them: surfaces that the motion leaves where the field jumps, or does not leave where its derivative jumps; and those
+/// that it slides on, if the way there is another one from each corner.
+pub(super) fn surfaces_at_start(
+    piece: &mut Piece,
+    (t, z): (f64, &[f64]),
+    kinds: &[Column],
+    columns: &[Vec<f64>],
+) -> Result<Vec<usize>, FieldError> {
+    let h = piece.surfaces(t, z)?;
+    let field = piece.rates(t, z)?;
+    let mut found = Vec::new();
+    for (j, h) in h.iter().enumerate() {
+        let size = {
+            let place = piece.at(t, z);
+            ROUNDING * piece.extended.system.surface_size(j, &place)?
+        };
+        if h.abs() > size {
+            continue;
+        }
+        let mut normal = vec![0.0; z.len()];
+        let by_time = piece.gradient(j, t, z, &mut normal)?;
+        let moves = |(kind, column): (&Column, &Vec<f64>)| {
+            let later = f64::from(*kind == Column::Start);
+            by_time * later + dot(&normal, column) != 0.0
+        };
+        if !kinds.iter().zip(columns).any(moves) {
+            continue;
+        }
+        let has_sides = match piece.mode.entries()[j] {
+            0 => piece.sliding.contains(&j) && !piece.is_affine,
+            _ => {
+                let system = &piece.extended.system;
+                system.jumps_across(j, &piece.signs, &piece.sliding)
+                    || (is_kept(piece, j, (t, z), (by_time, &normal), &field)?
+                        && bends_across(piece, j, (t, z), &normal)?)
+            }
+        };
+        if has_sides {
+            found.push(j);
+        }
+    }
+    Ok(found)
+}
+
+/// Does a motion with this velocity stay on a surface, as far as the first two derivatives say?
+fn is_kept(
+    piece: &Piece,
+    j: usize,
+    (t, z): (f64, &[f64]),
+    (by_time, normal): (f64, &[f64]),
+    field: &[f64],
+) -> Result<bool, FieldError> {
+    let is_zero = |time: f64, gradient: &[f64]| {
+        let terms = gradient.iter().zip(field).map(|(g, f)| (g * f).abs());
+        let size = time.abs() + terms.sum::<f64>();
+        (time + dot(gradient, field)).abs() <= AT_SIDE * size
+    };
+    if !is_zero(by_time, normal) {
+        return Ok(false);
+    }
+    if !piece.sliding.is_empty() {
+        return Ok(true);
+    }
+    let mut by_state = vec![0.0; z.len()];
+    let rate = piece
+        .extended
+        .system
+        .rate_gradient(j, &piece.at(t, z), &mut by_state)?;
+    Ok(is_zero(rate.time, &by_state))
+}
+
+/// Does the derivative of the field jump across a surface where the field does not?
+fn bends_across(
+    piece: &Piece,
+    j: usize,
+    (t, z): (f64, &[f64]),
+    normal: &[f64],
+) -> Result<bool, FieldError> {
+    let size = dot(normal, normal).sqrt();
+    let step = AT_SIDE.sqrt() / size;
+    let beside: Vec<f64> = z
+        .iter()
+        .zip(normal)
+        .map(|(z, n)| z + step * n / size)
+        .collect();
+    let [above, below] = [1.0, -1.0].map(|sign| piece.corner(t, &beside, &[(j, sign)]));
+    let (above, below) = (above?, below?);
+    let jump = above.iter().zip(&below).map(|(a, b)| (a - b).abs());
+    Ok(jump.fold(0.0, f64::max) > step * AT_SIDE.sqrt())
+}
+
+/// Does a clock tick at the initial time, at another time for some of these columns, and change the motion?
+pub(super) fn ticks_at_start(
+    around: &Surroundings,
+    piece: &mut Piece,
+    (t, z): (f64, &[f64]),
+    kinds: &[Column],
+) -> Result<bool, FieldError> {
+    let extended = piece.extended;
+    let ticks = extended.ticks_at(&piece.at(t, z));
+    let moves = |kind: &Column, tick: &[f64]| match *kind {
+        Column::Start => true,
+        Column::State(i) => tick[i] != 0.0,
+        Column::Parameter(p) => tick[extended.n + p] != 0.0,
+    };
+    if !kinds
+        .iter()
+        .any(|kind| ticks.iter().any(|tick| moves(kind, tick)))
+    {
+        return Ok(false);
+    }
+    let q = extended.discrete_before(t, (&z[..extended.n], &piece.q))?;
+    let mut earlier = Piece::new(around, &piece.mode, &q);
+    let system = &extended.system;
+    for (j, h) in earlier.surfaces(t, z)?.iter().enumerate() {
+        let side = f64::from(piece.mode.entries()[j]);
+        let is_elsewhere = h * side < 0.0 || side == 0.0;
+        if is_elsewhere && h.abs() > AT_SIDE * system.surface_size(j, &earlier.at(t, z))? {
+            return Ok(true);
+        }
+    }
+    Ok(differ(&piece.rates(t, z)?, &earlier.rates(t, z)?))
+}
+
+/// Do two vectors differ by more than rounding?
+pub(super) fn differ(one: &[f64], other: &[f64]) -> bool {
+    let size = one
+        .iter()
+        .chain(other)
+        .fold(0.0_f64, |most, v| most.max(v.abs()));
+    let mut entries = one.iter().zip(other);
+    entries.any(|(a, b)| (a - b).abs() > AT_SIDE * size)
+}

@@ -1,0 +1,77 @@
+"""Mistakes that derivatives through events are known for, each with its exact value."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+TIGHT: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
+METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
+
+
+def test_rates_are_those_before_and_behind_a_jump() -> None:
+    """x' = a x, and x jumps from 2 to 3: the time moves by the rate before, the state by both."""
+    jump = fl.Reset(lambda t, x: x[0] - 2, lambda t, x: [x[0] + 1], direction="up")
+    system = fl.System(lambda t, x, a: [a * x[0]], n=1, params={"a": 0.7}, resets=jump)
+    sol = system.solve((0, 1.5), [1.0], wrt=["y0", "a"], **TIGHT)
+    # x(T) = 3 exp(a (T - t*)), t* = log(2 / x(0)) / a.
+    end = 3 * math.exp(0.7 * 1.5) / 2
+    np.testing.assert_allclose(sol.y[0, -1], end, rtol=1e-12)
+    np.testing.assert_allclose(sol.derivative(), [[end, 1.5 * end]], rtol=1e-11)
+    _, back = fl.gradient(system, (0, 1.5), [1.0], terminal=lambda t, y: y[0], wrt=["y0", "a"], **TIGHT)
+    np.testing.assert_allclose([back["x[0]"], back["a"]], [end, 1.5 * end], rtol=1e-11)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-12])
+@pytest.mark.parametrize("method", METHODS)
+def test_the_time_of_an_event_is_not_differentiated_through_the_interpolant(method: str, rtol: float) -> None:
+    """x' = 1 and an event at x = q: dT/dq = 1 at every tolerance."""
+    system = fl.System(lambda t, x, q: [1.0], n=1, params={"q": 0.7})
+    stop = fl.Event(lambda t, x, q: x[0] - q, terminal=True)
+    options: dict[str, Any] = {"events": stop, "method": method, "rtol": rtol, "atol": rtol}
+    sol = system.solve((0, 2), [0.0], wrt=["y0", "q", "t0"], **options)
+    np.testing.assert_allclose(sol.dt_events[0], [[-1.0, 1.0, 1.0]], rtol=0, atol=1e-15)
+    value, back = fl.gradient(system, (0, 2), [0.0], terminal=lambda t, y: t, wrt=["q"], **options)
+    assert value == pytest.approx(0.7, abs=1e-12)
+    assert back["q"] == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_reset_at_a_parameter(method: str) -> None:
+    """x' = 1, set to 0 at x = p: dx(1)/dp = -1."""
+    back = fl.Reset(lambda t, x, p: x[0] - p, lambda t, x: [0.0], direction="up")
+    system = fl.System(lambda t, x, p: [1.0], n=1, params={"p": 0.6}, resets=back)
+    sol = system.solve((0, 1), [0.0], wrt=["p", "y0"], method=method)
+    np.testing.assert_allclose(sol.derivative(), [[-1.0, 1.0]], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_times_of_output_near_an_event_do_not_enter(method: str) -> None:
+    """Nor at it: the derivatives are the same to the bit, and those on both sides are the limits."""
+    wall = fl.Reset(lambda t, x: x[0], lambda t, x, r: [x[0], -r * x[1]], direction="down")
+    ball = fl.System(lambda t, x, r: [x[1], -1.0], n=2, params={"r": 0.8}, resets=wall)
+    options: dict[str, Any] = {"wrt": ["y0", "r"], "method": method, "rtol": 1e-9, "atol": 1e-9}
+    plain = ball.solve((0, 2), [0.5, 0.0], **options)
+    times = np.array([0.0, 1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6, 2.0])
+    sampled = ball.solve((0, 2), [0.5, 0.0], t_eval=times, **options)
+    assert np.array_equal(sampled.derivative(), plain.derivative())
+    assert np.array_equal(sampled.switches.dt, plain.switches.dt)
+    # The impact is at t1 = 1 with x' = -1; behind it x' = r (t1 - v) - (t - t1), and dt1 = dx + dv.
+    before, behind = sampled.derivative(times[2]), sampled.derivative(times[4])
+    np.testing.assert_allclose(before, [[1, 1, 0], [0, 1, 0]], atol=1e-8)
+    np.testing.assert_allclose(behind, [[-0.8, -0.8, 0], [1.8, 1, 1]], atol=1e-8)
+
+
+def test_a_derivative_of_a_stop_is_not_zero() -> None:
+    """x' = -a sign(x) from x = 1 is at rest at t = 1 / a: dt/da = -1 / a^2 = -0.25."""
+    stops = fl.System(lambda t, x, a: [-a * np.sign(x[0]), 1.0 - np.sign(x[0])], n=2, params={"a": 2.0})
+    sol = stops.solve((0, 1), [1.0, 0.0], wrt=["a"], **TIGHT)
+    assert sol.switches.dt[0, 0] == pytest.approx(-0.25, abs=1e-14)
+    # And what is counted from there on, y = 1 - t, grows by as much.
+    np.testing.assert_allclose(sol.derivative(), [[0.0], [0.25]], atol=1e-14)
+    _, back = fl.gradient(stops, (0, 1), [1.0, 0.0], terminal=lambda t, y: y[1], wrt=["a"], **TIGHT)
+    assert back["a"] == pytest.approx(0.25, abs=1e-14)

@@ -1,0 +1,155 @@
+"""All equilibria in a box: closed forms, and what is not proved."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+CASES = json.loads((Path(__file__).parent / "data" / "K3_bifurcations.json").read_text())["cases"]
+HARVEST = next(case for case in CASES if case["id"] == "harvest_equilibria")
+VALUES = {name: float(Fraction(text)) for name, text in HARVEST["parameters"].items()}
+
+
+def harvest(t: Any, z: Any, a: float, b: float, d: float, e: float, alpha: float) -> Any:
+    x, y = z
+    food = a * x / (b + x)
+    return [x * (1 - x) - food * y, y * (food - d - e * (y > alpha))]
+
+
+SYSTEM = fl.System(harvest, n=2, states=("x", "y"), params={**VALUES, "alpha": 0.41})
+BOX = {"x": (0.05, 1.5), "y": (0.05, 1.5)}
+
+
+@pytest.mark.parametrize("alpha", [0.25, 0.35, 0.41, 0.42, 0.45])
+def test_harvested_predators(alpha: float) -> None:
+    found = fl.equilibria(SYSTEM, BOX, {"alpha": alpha})
+    a, b, d, e = (VALUES[name] for name in "abde")
+    expected = []
+    if alpha > 0.4:
+        expected.append((0.2, 0.4, "-"))
+    if alpha < 0.3:
+        expected.append((0.7, 0.3, "+"))
+    roots = np.roots([1.0, b - 1.0, a * alpha - b])
+    real = np.sort(roots.real[np.abs(roots.imag) < 1e-12])
+    multipliers = 2 * (a * real / (b + real) - d) / e - 1
+    inside = np.abs(multipliers) <= 1
+    expected += [(x, alpha, "0") for x in real[inside]]
+    assert found.certified
+    assert [str(point.mode) for point in found] == [mode for _, _, mode in expected]
+    for point, (x, y, _) in zip(found, expected, strict=True):
+        np.testing.assert_allclose(point.y, [x, y], rtol=1e-12)
+        assert point.is_admissible
+    sliding = [point.multipliers[0] for point in found if point.codimension == 1]
+    np.testing.assert_allclose(sliding, multipliers[inside], rtol=1e-9)
+
+
+def test_a_fold_is_found_and_not_proved() -> None:
+    fold = HARVEST["closed_form"]["pseudo_saddle_node"]
+    found = fl.equilibria(SYSTEM, BOX, {"alpha": float(Fraction(fold["alpha"]))})
+    assert not found.certified
+    places = np.array([point.y for point in found if point.codimension == 1])
+    assert np.min(np.abs(places[:, 0] - float(Fraction(fold["x"])))) < 1e-6
+    # What is left are boxes around it.
+    assert all(np.all(np.abs(box.mean(axis=1) - [0.35, 0.4225]) < 1e-3) for box in found.unresolved)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_piecewise_linear_planar_systems(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    A, b = random.normal(size=(2, 2, 2)), random.normal(size=(2, 2))
+
+    def fun(t: Any, x: Any) -> Any:
+        plus, minus = A[0] @ x + b[0], A[1] @ x + b[1]
+        return np.where(x[0] - 0.1 > 0, plus, minus)
+
+    size = 5.0
+    expected = []
+    for k, side in enumerate((1, -1)):
+        x = -np.linalg.solve(A[k], b[k])
+        if side * (x[0] - 0.1) > 0:
+            expected.append((*x, side))
+    # The component along the surface of the combination that does not leave it, as a polynomial in y.
+    rows = [[A[k][:, 1], A[k][:, 0] * 0.1 + b[k]] for k in (0, 1)]
+    lines = [[np.array([slope[i], constant[i]]) for i in (0, 1)] for slope, constant in rows]
+    polynomial = np.polysub(np.polymul(lines[1][0], lines[0][1]), np.polymul(lines[0][0], lines[1][1]))
+    for y in np.roots(polynomial):
+        if abs(np.imag(y)) < 1e-12:
+            y = float(np.real(y))
+            plus, minus = (A[k][0] @ [0.1, y] + b[k][0] for k in (0, 1))
+            if plus * minus < 0:
+                expected.append((0.1, y, 0))
+    expected = [point for point in expected if max(abs(point[0]), abs(point[1])) < size]
+    found = fl.equilibria(fl.System(fun, n=2), [(-size, size)] * 2)
+    assert found.certified
+    key = lambda point: (point[2] == 0, point[0], point[1])  # noqa: E731
+    assert [entry for *_, entry in sorted(expected, key=key)] == [point.mode[0] for point in found]
+    for point, (*x, _) in zip(found, sorted(expected, key=key), strict=True):
+        np.testing.assert_allclose(point.y, x, rtol=1e-9, atol=1e-12)
+
+
+def test_virtual_ones_are_asked_for() -> None:
+    fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.3 * x[0] * (x[0] > a)], n=1)
+    found = fl.equilibria(fish, [(-1, 2)], virtual=True)
+    rows = [(str(point.mode), round(float(point.y[0]), 9), point.is_admissible) for point in found]
+    assert rows == [
+        *[("-", 0.0, True), ("+", 0.0, False), ("+", 0.7, True), ("-", 1.0, False), ("0", 0.5, False)]
+    ]
+    np.testing.assert_allclose(found[4].multipliers, [7 / 3], rtol=1e-12)
+    found = fl.equilibria(fish, [(-1, 2)], {"a": 0.8})
+    assert [str(point.mode) for point in found] == ["-", "0"]
+
+
+def test_two_surfaces_and_four_states() -> None:
+    # Two blocks under friction, each at rest where springs and weights allow: the corner y = (0, 0).
+    def fun(t: Any, x: Any) -> Any:
+        return [0.3 - np.sign(x[0]), -0.4 - np.sign(x[1]), 1 - x[2] ** 2, x[2] - 2 * x[3]]
+
+    found = fl.equilibria(fl.System(fun, n=4), [(-1.0, 2.0)] * 4)
+    assert found.certified
+    assert [str(point.mode) for point in found] == ["00", "00"]
+    np.testing.assert_allclose([point.y for point in found], [[0, 0, -1, -0.5], [0, 0, 1, 0.5]], atol=1e-12)
+    np.testing.assert_allclose(found[0].multipliers, [0.3, -0.4], rtol=1e-12)
+
+
+def test_larger_systems_are_searched() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [-x[k] + 0.2 * k - 0.5 * np.sign(x[0] - 0.1) * (k == 0) for k in range(6)]
+
+    found = fl.equilibria(fl.System(fun, n=6), [(-2.0, 2.0)] * 6)
+    assert not found.certified
+    assert [str(point.mode) for point in found] == ["0"]
+    np.testing.assert_allclose(found[0].y, [0.1, 0.2, 0.4, 0.6, 0.8, 1.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("box", "message"),
+    [
+        ([(0, 1)], "ends for 2 states are needed, 1 are given"),
+        ([(0, 1), (1, 1)], "lower < upper"),
+        ([(0, 1), (0, np.inf)], "finite ends"),
+        ([(0, 1), 3], "a lower and an upper end"),
+        ({"x": (0, 1)}, "no ends for y"),
+        ({"x": (0, 1), "z": (0, 1)}, "no state 'z'"),
+        (7, "lower and upper ends"),
+    ],
+)
+def test_wrong_boxes_are_refused(box: Any, message: str) -> None:
+    with pytest.raises(fl.InputError, match=message):
+        fl.equilibria(SYSTEM, box)
+
+
+def test_other_systems_are_refused() -> None:
+    forced = fl.System(lambda t, x: [np.cos(t) - x[0]], n=1)
+    with pytest.raises(fl.InputError, match="depends on the time"):
+        fl.equilibria(forced, [(-1, 1)])
+    relay = fl.System(lambda t, x: [-fl.hysteresis(x[0], -0.1, 0.1)], n=1)
+    with pytest.raises(fl.InputError, match="laws with a memory"):
+        fl.equilibria(relay, [(-1, 1)])
+    with pytest.raises(fl.InputError, match="System is needed"):
+        fl.equilibria(lambda t, x: x, [(-1, 1)])  # type: ignore[arg-type]

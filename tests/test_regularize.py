@@ -1,0 +1,140 @@
+"""Regularised systems: they converge to the piecewise-smooth one, whatever the spelling of its switches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def with_if(t: Any, x: Any, F: float = 0.4) -> Any:
+    y, v = x
+    if v > 0:
+        return [v, np.sin(t / 3) - y - F]
+    return [v, np.sin(t / 3) - y + F]
+
+
+def spelled(force: Callable[[Any], Any]) -> Callable[..., Any]:
+    def friction(t: Any, x: Any, F: float = 0.4) -> Any:
+        return [x[1], np.sin(t / 3) - x[0] - F * force(x[1])]
+
+    return friction
+
+
+# The same dry friction in several spellings.
+SPELLINGS: dict[str, Callable[..., Any]] = {
+    "sign": spelled(np.sign),
+    "where": spelled(lambda v: np.where(v > 0, 1.0, -1.0)),
+    "if": with_if,
+    "comparison": spelled(lambda v: 2.0 * (v > 0) - 1.0),
+    "heaviside": spelled(lambda v: 2.0 * np.heaviside(v, 0.5) - 1.0),
+    "abs": spelled(lambda v: np.abs(v) / v),
+    "maximum": spelled(lambda v: np.maximum(v, 0.0) / v + np.minimum(v, 0.0) / -v),
+}
+RUN: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
+
+
+def end(system: fl.System, **options: Any) -> Any:
+    return system.solve((0, 20), [1.0, 2.0], **RUN, **options).y[:, -1]
+
+
+def at(system: fl.System, x: Any, t: float = 0.0) -> Any:
+    return system.field(t, x, system.classify(t, x).mode)
+
+
+# Those with a division by v are not defined at v = 0, where the exact motion sticks.
+@pytest.mark.parametrize("kind", ["tanh", "linear"])
+@pytest.mark.parametrize("spelling", ["sign", "where", "if", "comparison", "heaviside"])
+def test_twins_converge(spelling: str, kind: str) -> None:
+    system = fl.System(SPELLINGS[spelling], n=2)
+    exact = end(system)
+    assert system.solve((0, 20), [1.0, 2.0]).switches.kind.tolist().count("enter_sliding") > 0
+    widths = (1e-1, 1e-2, 1e-3, 1e-4)
+    errors = [np.max(np.abs(end(system.regularize(eps, kind), method="Rodas5P") - exact)) for eps in widths]
+    # The error is of the first order in eps, for tanh with a logarithm.
+    assert errors[-1] < 1e-3
+    assert np.all(np.diff(np.log10(errors)) < -0.7)
+
+
+@pytest.mark.parametrize("spelling", list(SPELLINGS))
+def test_all_spellings_have_the_same_twin(spelling: str) -> None:
+    one, other = (fl.System(SPELLINGS[name], n=2).regularize(0.1) for name in (spelling, "sign"))
+    for point in ([0.3, 0.2], [0.3, -0.05], [-1.0, 2.0]):
+        np.testing.assert_allclose(at(one, point, 0.7), at(other, point, 0.7), rtol=1e-14)
+
+
+def test_kinks_become_smooth() -> None:
+    system = fl.System(lambda t, x: [np.abs(x[0]) - np.maximum(x[0], x[1]), -x[1]], n=2)
+    smooth = system.regularize(0.2)
+    x, y = 0.3, 0.1
+    first, second = np.tanh(x / 0.2), np.tanh((x - y) / 0.2)
+    larger = 0.5 * (x + y) + second * 0.5 * (x - y)
+    np.testing.assert_allclose(at(smooth, [x, y]), [x * first - larger, -y], rtol=1e-14)
+
+
+def test_the_width_is_a_parameter() -> None:
+    system = fl.System(lambda t, x, a=0.5: [a - np.sign(x[0])], n=1)
+    smooth = system.regularize(1e-2, kappa=2.0)
+    assert smooth.params == {"a": 0.5, "eps": 1e-2}
+    assert smooth.surfaces == []
+    for eps, a in ((1e-2, 0.5), (1e-3, -0.2)):
+        at_rest = smooth.solve((0, 5), [1.0], eps=eps, a=a, **RUN).y[0, -1]
+        np.testing.assert_allclose(at_rest, eps / 2.0 * np.arctanh(a), rtol=1e-6)
+    copy = fl.System.from_bytes(smooth.to_bytes())
+    assert copy.params == smooth.params
+    assert at(copy, [0.01]) == at(smooth, [0.01])
+
+
+def test_kappa_of_each_surface() -> None:
+    system = fl.System(lambda t, x: [-np.sign(x[0]), -np.sign(x[1])], n=2)
+    smooth = system.regularize(0.5, kappa=[1.0, 4.0])
+    np.testing.assert_allclose(at(smooth, [0.1, 0.1]), [-np.tanh(0.2), -np.tanh(0.8)], rtol=1e-14)
+    linear = system.regularize(0.5, "linear", kappa=[1.0, 4.0])
+    np.testing.assert_allclose(at(linear, [0.1, 0.2]), [-0.2, -1.0], rtol=1e-14)
+    assert linear.n_surfaces == 4
+
+
+def test_nested_switches() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [-np.sign(x[0] - 0.5 * np.sign(x[1])), -x[1]]
+
+    smooth = fl.System(fun, n=2).regularize(0.1)
+    x, y = 0.3, 0.02
+    # In each region the switching function is another one, and the two outcomes are weighted.
+    weight = 0.5 * (1.0 + np.tanh(y / 0.1))
+    expected = -(weight * np.tanh((x - 0.5) / 0.1) + (1.0 - weight) * np.tanh((x + 0.5) / 0.1))
+    np.testing.assert_allclose(at(smooth, [x, y])[0], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fun", "others", "message"),
+    [
+        (lambda t, x: [-np.floor(x[0])], {}, "quantisers, clocks and laws"),
+        (lambda t, x: [-fl.hysteresis(x[0], -0.1, 0.1)], {}, "laws with a memory"),
+        (
+            lambda t, x: [-np.sign(x[0])],
+            {"resets": fl.Reset(lambda t, x: x[0] - 1, lambda t, x: [0.5 * x[0]], name="kick")},
+            "resets: 'kick'",
+        ),
+    ],
+)
+def test_what_has_no_smooth_twin_is_refused(fun: Any, others: Any, message: str) -> None:
+    with pytest.raises(fl.ModelError, match=message):
+        fl.System(fun, n=1, **others).regularize(0.1)
+
+
+def test_wrong_arguments_are_refused() -> None:
+    system = fl.System(lambda t, x: [-np.sign(x[0])], n=1)
+    with pytest.raises(fl.InputError, match="eps: a positive number"):
+        system.regularize(0.0)
+    with pytest.raises(fl.InputError, match='kind: "tanh" or "linear"'):
+        system.regularize(0.1, "sigmoid")
+    with pytest.raises(fl.InputError, match="kappa: one entry per surface"):
+        system.regularize(0.1, kappa=[1.0, 2.0])
+    with pytest.raises(fl.InputError, match="kappa: a positive number"):
+        system.regularize(0.1, kappa=-1.0)
+    with pytest.raises(fl.InputError, match="parameter of this name"):
+        system.regularize(0.1).regularize(0.1)
