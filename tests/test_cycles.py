@@ -215,3 +215,13 @@ def test_black_boxes_are_refused_by_name() -> None:
     box = fl.System(called, n=2, surfaces=[lambda t, x: x[1]])
     with pytest.raises(fl.InputError, match="derivatives"):
         fl.limit_cycle(box, [1.0, 0.0])
+
+
+def test_a_reset_that_forgets_the_state_keeps_the_delay() -> None:
+    # Integrate and fire: the trivial multiplier is 1, as in every cycle without forcing.
+    fire = fl.Reset(lambda t, x: x[0] - 1, lambda t, x: [0 * x[0]], direction="up")
+    cycle = fl.limit_cycle(fl.System(lambda t, x, drive=1.5: [drive - x[0]], n=1, resets=fire), [0.1])
+    assert abs(cycle.period - math.log(3)) < 1e-12
+    assert cycle.n_zero == 0
+    np.testing.assert_allclose(cycle.multipliers, [1.0], atol=1e-10)
+    assert cycle.is_stable

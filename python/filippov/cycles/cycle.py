@@ -106,9 +106,10 @@ class Cycle:
         """How many multipliers are zero: sliding on m surfaces takes m of them, contact two for each."""
         found = max(_codimension(self._shooting.motions, leg) for leg in self.itinerary.legs)
         n = self._shooting.n
-        for passage in self._shot.passages:
-            rank = int(np.linalg.matrix_rank(passage.map[:, 1 : 1 + n], tol=1e-12))
-            found = max(found, n - rank)
+        for k, passage in enumerate(self._shot.passages):
+            if self.itinerary.legs[k].ending is not None:
+                following = self._shot.passages[(k + 1) % len(self._shot.passages)]
+                found = max(found, n - _rank(passage.saltation(following.leg.velocities[0])))
         return min(found, n)
 
     @cached_property
@@ -258,6 +259,13 @@ class Cycle:
     def _with_derivatives_by(self, names: Sequence[str]) -> Shooting:
         motions = self._shooting.motions.with_derivatives_by(names)
         return Shooting(motions, self.itinerary, self._shooting.period)
+
+
+def _rank(matrix: Array) -> int:
+    """Return the rank of a matrix; what is rounding beside its largest entry is zero."""
+    if not np.all(np.isfinite(matrix)):  # an impact without speed
+        return len(matrix)
+    return int(np.linalg.matrix_rank(matrix, tol=1e-10 * max(float(np.max(np.abs(matrix))), 1e-300)))
 
 
 def multipliers_of(monodromy: Array, n_zero: int) -> npt.NDArray[np.complex128]:

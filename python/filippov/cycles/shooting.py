@@ -52,6 +52,18 @@ class Passage(NamedTuple):
     map: Array
     discrete: tuple[float, ...]
 
+    def saltation(self, following: Array) -> Array:
+        """Return the derivative of the state behind the end by that before, from the velocity behind."""
+        n = len(self.after)
+        if self.row is None:
+            return np.eye(n)
+        at_end, normal = self.leg.velocities[1], self.row[1 : 1 + n]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            time = -normal / (self.row[0] + normal @ at_end)
+            states = np.eye(n) + np.outer(at_end, time)
+            moved = self.map[:, 1 : 1 + n] @ states + np.outer(self.map[:, 0], time)
+            return np.asarray(moved - np.outer(following, time))
+
 
 class Shot(NamedTuple):
     """The equations at a point.
