@@ -33,6 +33,8 @@ AnyCurve = CycleCurve | EquilibriumCurve
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _WIDTH = 1e-13
 _SAVED_EVERY = 50
+# Their test functions change signs with the direction.
+_TURNING = ("LP", "PSN", "BP")
 
 
 class _Settings(NamedTuple):
@@ -237,6 +239,32 @@ def at_value(state: State, name: str, value: float) -> State:
     return rest_of(curve, state._w[: curve.n_unknowns])
 
 
+class _Position(NamedTuple):
+    """A point of a branch with what is needed to go on from it.
+
+    Attributes
+    ----------
+    curve : CycleCurve or EquilibriumCurve
+        The equations of its itinerary.
+    w : ndarray
+        Unknowns and parameter.
+    tangent : ndarray
+        The direction, in scaled unknowns.
+    tests : dict
+        The values of the test functions.
+    """
+
+    curve: AnyCurve
+    w: Array
+    tangent: Array
+    tests: dict[Any, float]
+
+    def turned(self) -> _Position:
+        """Return the same point, to be left in the other direction."""
+        tests = {key: -value if key[0] in _TURNING else value for key, value in self.tests.items()}
+        return self._replace(tangent=-self.tangent, tests=tests)
+
+
 class _Side:
     """One direction of a branch."""
 
@@ -245,137 +273,127 @@ class _Side:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason = "interrupted"
-        self._begin(start, direction)
+        self._go_on(self._position(start, direction), start)
 
-    def _begin(self, state: State, direction: float) -> None:
-        """Start with the itinerary of a state."""
-        self.curve, self.w = curve_of(state, (self.settings.name,), (self.settings.size,))
-        _, jacobian = self.curve.equations(self.w)
-        scale = self.curve.scales(self.w)
-        self.tangent = tangent_of(jacobian, scale)
-        if self.tangent[-1] * direction < 0:
-            self.tangent = -self.tangent
-        self.jacobian = jacobian
-        self.tests = self._tests(self.w, jacobian, self.tangent)
-        self._keep(state)
+    def _position(self, state: State, direction: float) -> _Position:
+        """Return the position of a state, from which the parameter goes in a direction."""
+        curve, w = curve_of(state, (self.settings.name,), (self.settings.size,))
+        _, jacobian = curve.equations(w)
+        tangent = tangent_of(jacobian, curve.scales(w))
+        if tangent[-1] * direction < 0:
+            tangent = -tangent
+        return _Position(curve, w, tangent, self._tests(curve, w, jacobian, tangent))
 
-    def _tests(self, w: Array, jacobian: Array, tangent: Array) -> dict[Any, float]:
-        found = tests_at(self.curve, w, jacobian, tangent, self.settings.detect)
+    def _tests(self, curve: AnyCurve, w: Array, jacobian: Array, tangent: Array) -> dict[Any, float]:
+        found = tests_at(curve, w, jacobian, tangent, self.settings.detect)
         for monitor in self.settings.monitors:
-            found["UZ", monitor.name] = monitor.value(self.curve.state(w, 0.0))
+            found["UZ", monitor.name] = monitor.value(curve.state(w, 0.0))
         return found
 
-    def _keep(self, state: State) -> None:
-        value = float(self.w[-1])
-        self.points.append(Point({self.settings.name: value}, state, self.tests))
+    def _go_on(self, position: _Position, state: State) -> None:
+        """Take a position as the next point of the branch."""
+        self.here = position
+        value = float(position.w[-1])
+        self.points.append(Point({self.settings.name: value}, state, position.tests))
         self.settings.report(len(self.points), value)
         if len(self.points) % _SAVED_EVERY == 0:
             self.settings.save()
 
     def follow(self) -> None:
         """Follow the branch to its end."""
-        low, high = self.settings.bounds
         ds = self.settings.step
-        changes = 0
         while len(self.points) < self.settings.most:
-            if not low < self.w[-1] < high and self._leads_out():
-                self.reason = f"{self.settings.name} = {self.w[-1]:g} is the end of the range"
-                self._add("EP", None, self.points[-1].state)
+            if self._is_at_end():
+                self.reason = f"{self.settings.name} = {self.here.w[-1]:g} is the end of the range"
+                self._add("EP", None, self.here.curve, self.points[-1].state)
                 return
+            n_special = len(self.special)
             try:
-                step, tangent = self._step(ds)
+                step, next_one = self._step(ds)
+                goes_on = self._accept(step, next_one)
             except ModelError as error:
-                if ds > 4e-3 or (isinstance(self.curve, EquilibriumCurve) and ds > _SHORTEST_STEP):
-                    ds *= 0.5
-                    continue
-                found = self._beyond_vanishing_leg(max(ds, 1e-3)) if self._may_change() else None
-                if found is not None:
-                    changes += 1
+                del self.special[n_special:]
+                is_long = ds > (_SHORTEST_STEP if isinstance(self.here.curve, EquilibriumCurve) else 4e-3)
+                if not is_long and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
                     ds = min(self.settings.step, 4 * ds)
-                    continue
-                if ds > _SHORTEST_STEP:
+                elif ds > _SHORTEST_STEP:
                     ds *= 0.5
-                    continue
-                self.reason = self._why_it_ended(error)
-                return
-            if not self._accept(step, tangent, ds):
+                else:
+                    self.reason = self._why_it_ended(error)
+                    return
+                continue
+            if not goes_on:
                 return
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
         self.reason = f"{self.settings.most} points"
 
-    def _may_change(self) -> bool:
-        return isinstance(self.curve, CycleCurve) and self.settings.switch == "follow"
+    def _is_at_end(self) -> bool:
+        """Whether the range ends here, and the branch does not lead into it."""
+        (low, high), value = self.settings.bounds, self.here.w[-1]
+        if low < value < high:
+            return False
+        outward = -1.0 if value <= low else 1.0
+        return bool(self.here.tangent[-1] * outward > 0) or len(self.points) > 1
 
-    def _leads_out(self) -> bool:
-        low, _ = self.settings.bounds
-        outward = -1.0 if self.w[-1] <= low else 1.0
-        return bool(self.tangent[-1] * outward > 0) or len(self.points) > 1
-
-    def _step(self, ds: float) -> tuple[Step, Array]:
-        """Return the next point and the direction there."""
+    def _step(self, ds: float) -> tuple[Step, _Position]:
+        """Return the next point, with its position."""
+        curve, w, tangent, _ = self.here
         low, high = self.settings.bounds
-        scale = self.curve.scales(self.w)
-        guess = self.w + ds * self.tangent * scale
-        step = corrected(self.curve, guess, scale, self.tangent)
+        scale = curve.scales(w)
+        step = corrected(curve, w + ds * tangent * scale, scale, tangent)
         if not low <= step.w[-1] <= high:
-            unit = np.zeros(len(self.w))
-            unit[-1] = 1.0
             bound = low if step.w[-1] < low else high
-            share = (bound - self.w[-1]) / (step.w[-1] - self.w[-1])
-            on_bound = self.w + share * (step.w - self.w)
-            on_bound[-1] = bound
-            step = corrected(self.curve, on_bound, scale, unit)
-            step.w[-1] = bound
-        tangent = tangent_of(step.jacobian, self.curve.scales(step.w), self.tangent)
-        if tangent @ self.tangent < 0.8 and ds > 1e-4:
+            share = (bound - w[-1]) / (step.w[-1] - w[-1])
+            step = _at_parameter(curve, w + share * (step.w - w), bound, scale)
+        following = tangent_of(step.jacobian, curve.scales(step.w), tangent)
+        if following @ tangent < 0.8 and ds > 1e-4:
             raise ModelError("the branch turns too far in one step")
-        return step, tangent
+        tests = self._tests(curve, step.w, step.jacobian, following)
+        return step, _Position(curve, step.w, following, tests)
 
-    def _accept(self, step: Step, tangent: Array, ds: float) -> bool:
+    def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
-        tests = self._tests(step.w, step.jacobian, tangent)
-        changed = [key for key, value in tests.items() if key in self.tests and value * self.tests[key] < 0]
-        found = sorted((self._located(key, step, tests) for key in changed), key=lambda located: located[0])
+        before, after = self.here.tests, following.tests
+        changed = [key for key, value in after.items() if key in before and value * before[key] < 0]
+        found = sorted((self._located(self.here, key, following) for key in changed), key=lambda at: at[0])
+        curve = self.here.curve
         for _, key, located in found:
-            code = key[0]
-            state = self.curve.state(located.w, located.error)
-            if code in CHANGES and self.settings.switch != "ignore":
-                if self.tests[key] < 0:
+            state = curve.state(located.w, located.error)
+            if key[0] in CHANGES and self.settings.switch != "ignore":
+                if before[key] < 0:
                     continue  # it becomes possible again: the flow does not follow it yet
-                self._add_located(key, state)
+                self._add(key[0], key, curve, state)
                 if self.settings.switch == "stop":
                     self.reason = f"{self.special[-1]!r}"
                     return False
-                return self._change(key, located, step)
-            if self._is_real(key, state):
-                self._add_located(key, state)
-        self._settle(step, tangent, tests)
+                return self._change(key, located, following.w)
+            if _is_real(key, state):
+                self._add(key[0], key, curve, state)
+        state = curve.state(step.w, step.error)
+        curve.refer_to(step.w)
+        self._go_on(following, state)
         return True
 
-    def _settle(self, step: Step, tangent: Array, tests: dict[Any, float]) -> None:
-        state = self.curve.state(step.w, step.error)
-        self.curve.refer_to(step.w)
-        self.w, self.tangent, self.tests, self.jacobian = step.w, tangent, tests, step.jacobian
-        self._keep(state)
-
-    def _located(self, key: Any, step: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
-        """Return how far along the step a test function vanishes, which one, and the point."""
-        scale = self.curve.scales(self.w)
-        start, level = self.w, float(self.w / scale @ self.tangent)
-        length = float(step.w / scale @ self.tangent) - level
+    def _located(self, start: _Position, key: Any, end: _Position) -> tuple[float, Any, Step]:
+        """Return how far along a step a test function vanishes, which one, and the point."""
+        curve, w, tangent, tests = start
+        scale = curve.scales(w)
+        level = float(w / scale @ tangent)
+        length = float(end.w / scale @ tangent) - level
         nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
-            guess = start + (s / length) * (step.w - start)
-            point = corrected(self.curve, guess, scale, self.tangent, level + s)
-            tangent = tangent_of(point.jacobian, self.curve.scales(point.w), self.tangent)
-            found = self._value(key, point, tangent)
-            if not nearest or abs(found) <= nearest[0][0]:
-                nearest[:] = [(abs(found), s, point)]
-            return found
+            point = corrected(curve, w + (s / length) * (end.w - w), scale, tangent, level + s)
+            following = tangent_of(point.jacobian, curve.scales(point.w), tangent)
+            found = self._tests(curve, point.w, point.jacobian, following)
+            if key not in found:
+                raise ModelError(f"the test function of {key[0]} is lost on the way")
+            if not nearest or abs(found[key]) <= nearest[0][0]:
+                nearest[:] = [(abs(found[key]), s, point)]
+            return found[key]
 
         try:
-            zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
+            zero_between(value, (0.0, tests[key]), (length, end.tests[key]), _WIDTH)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
             if key[0] in CHANGES or not nearest:
@@ -383,144 +401,131 @@ class _Side:
         _, s, point = nearest[0]
         return s, key, point
 
-    def _value(self, key: Any, point: Step, tangent: Array) -> float:
-        found = self._tests(point.w, point.jacobian, tangent)
-        if key not in found:
-            raise ModelError(f"the test function of {key[0]} is lost on the way")
-        return found[key]
-
-    def _is_real(self, key: Any, state: State) -> bool:
-        """Whether a zero of a test function is what its code says."""
-        if key[0] == "HB":
-            assert isinstance(state, Equilibrium)
-            values = state.eigenvalues
-            critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
-            return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
-        if key[0] == "NS":
-            assert isinstance(state, Cycle)
-            values = state.nontrivial
-            critical = values[np.argmin(np.abs(np.abs(values) - 1.0))]
-            return bool(abs(critical.imag) > 1e-6)
-        return True
-
-    def _add_located(self, key: Any, state: State) -> None:
-        self._add(key[0], key, state)
-
-    def _add(self, code: str, key: Any, state: State) -> None:
+    def _add(self, code: str, key: Any, curve: AnyCurve, state: State) -> None:
+        """Take down a special point."""
         if code not in self.settings.detect:
             return
+        name = self.settings.name
         surface, t = "", np.nan
-        if code in CHANGES and key is not None:
-            place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
-            names = (
-                self.curve.shooting.motions.prepared.surfaces
-                if isinstance(self.curve, CycleCurve)
-                else (self.curve.motions.prepared.surfaces)
-            )
-            surface = names[place] if 0 <= place < len(names) else ""
-            if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
-                probe = next((p for p in self.curve.probes(self._w_of(state)) if p.key == key), None)
-                t = np.nan if probe is None else (probe.t if state.is_forced else probe.t - state.t0)
-        params = {self.settings.name: state.params[self.settings.name]}
-        kind = f"{key[1]} vanishes" if code == "UZ" and key is not None else CODES[code]
+        if code in CHANGES:
+            if isinstance(curve, CycleCurve) and isinstance(state, Cycle):
+                motions, place = curve.shooting.motions, key[2][1]
+                probes = curve.probes(np.append(state._u, state.params[name]))
+                times = [probe.t for probe in probes if probe.key == key]
+                t = times[0] - (0.0 if state.is_forced else state.t0) if times else np.nan
+            else:
+                assert isinstance(curve, EquilibriumCurve)
+                motions, place = curve.motions, key[1]
+            surface = motions.prepared.surfaces[place] if place >= 0 else ""
+        kind = f"{key[1]} vanishes" if code == "UZ" else CODES[code]
+        params = {name: state.params[name]}
         self.special.append(Special(code, kind, surface, t, params, len(self.points) - 1, state, key))
 
-    def _w_of(self, state: Cycle) -> Array:
-        return np.append(state._u, state.params[self.settings.name])
-
-    def _change(self, key: Any, located: Step, beyond: Step) -> bool:
-        """Go on with the itinerary of the flow behind a special point."""
-        direction = float(np.sign(beyond.w[-1] - located.w[-1])) or self.direction
-        if isinstance(self.curve, EquilibriumCurve):
-            here = self.curve.state(located.w, located.error)
+    def _change(self, key: Any, located: Step, beyond: Array) -> bool:
+        """Go on with the itinerary of the flow behind a special point. False: the branch ends."""
+        curve = self.here.curve
+        direction = float(np.sign(beyond[-1] - located.w[-1])) or self.direction
+        following: tuple[State, float] | None = None
+        if isinstance(curve, EquilibriumCurve):
+            here = curve.state(located.w, located.error)
             following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
-            if following is None:
-                self.reason = f"no equilibrium goes on from {self.special[-1]!r}"
-                return False
-            state, direction = following
-            self._begin(state, direction)
-            return True
-        for reach in (1.0, 3.0, 0.3):
-            w = located.w + reach * (beyond.w - located.w)
-            new = _flow_near(self.curve, w)
-            if new is not None and not new.itinerary.is_same(self.curve.shooting.itinerary(w[:-1])):
-                self._begin(new, direction)
-                return True
-        if (
-            key[3] == "end"
-            and (without := _without_leg(self.curve, key[1], located, self.settings)) is not None
-        ):
-            self._begin(*without)
-            return True
-        self.reason = f"behind {self.special[-1]!r} no cycle of the flow was found"
-        return False
+        else:
+            for reach in (1.0, 3.0, 0.3):
+                w = located.w + reach * (beyond - located.w)
+                new = _flow_near(curve, w)
+                if new is not None and not new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
+                    following = new, direction
+                    break
+            if following is None and key[3] == "end":
+                following = _without_leg(curve, key[1], located, self.settings)
+        if following is None:
+            what = "equilibrium" if isinstance(curve, EquilibriumCurve) else "cycle of the flow"
+            self.reason = f"behind {self.special[-1]!r} no {what} was found"
+            return False
+        self._go_on(self._position(*following), following[0])
+        return True
 
-    def _beyond_vanishing_leg(self, ds: float) -> bool | None:
-        """Go on behind the point at which a leg vanishes, which the shorter itinerary locates."""
-        assert isinstance(self.curve, CycleCurve)
-        scale = self.curve.scales(self.w)
-        direction = float(np.sign(self.tangent[-1])) or self.direction
+    def _goes_beyond_a_vanishing_leg(self, ds: float) -> bool:
+        """Go on behind the point at which a leg vanishes, if there is one; the shorter itinerary locates it."""
+        curve, w, tangent, _ = self.here
+        if not isinstance(curve, CycleCurve) or self.settings.switch != "follow":
+            return False
+        scale = curve.scales(w)
+        direction = float(np.sign(tangent[-1])) or self.direction
         for reach in (1.0, 2.0, 4.0):
-            w = self.w + reach * ds * self.tangent * scale
-            new = _flow_near(self.curve, w, self.w)
-            if new is None or new.itinerary.is_same(self.curve.shooting.itinerary(self.w[:-1])):
+            new = _flow_near(curve, w + reach * ds * tangent * scale)
+            if new is None or new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
                 continue
-            shorter = _Side.__new__(_Side)
-            shorter.settings, shorter.direction = self.settings, direction
-            shorter.points, shorter.special, shorter.reason = self.points, self.special, ""
             try:
-                shorter._locate_behind(new, float(self.w[-1]), direction)
+                back = self._position(new, -direction)
+                self._locate_behind(back, float(w[-1]))
             except ModelError:
                 continue
-            self.curve, self.w, self.tangent = shorter.curve, shorter.w, shorter.tangent
-            self.tests, self.jacobian = shorter.tests, shorter.jacobian
+            self._go_on(back.turned(), new)
             return True
-        return None
+        return False
 
-    def _locate_behind(self, state: Cycle, value: float, direction: float) -> None:
-        """Go back from a cycle to a value of the parameter, and find which test function vanishes between."""
-        self._begin(state, -direction)
-        self.points.pop()
-        start = (self.w, self.tangent, self.tests, self.jacobian)
-        scale = self.curve.scales(self.w)
-        unit = np.zeros(len(self.w))
-        unit[-1] = 1.0
-        share = (value - self.w[-1]) / (self.tangent[-1] * scale[-1])
-        guess = self.w + share * self.tangent * scale
-        guess[-1] = value
-        step = corrected(self.curve, guess, scale, unit)
-        step.w[-1] = value
-        tangent = tangent_of(step.jacobian, self.curve.scales(step.w), self.tangent)
-        tests = self._tests(step.w, step.jacobian, tangent)
+    def _locate_behind(self, start: _Position, value: float) -> None:
+        """Go back to a value of the parameter, and find the test function that vanishes first on the way.
+
+        Raises
+        ------
+        ModelError
+            If none does.
+        """
+        curve, w, tangent, tests = start
+        scale = curve.scales(w)
+        share = (value - w[-1]) / (tangent[-1] * scale[-1])
+        step = _at_parameter(curve, w + share * tangent * scale, value, scale)
+        following = tangent_of(step.jacobian, curve.scales(step.w), tangent)
+        end = _Position(curve, step.w, following, self._tests(curve, step.w, step.jacobian, following))
         lost = [
-            key
-            for key in tests
-            if key[0] in CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
+            key for key in end.tests if key[0] in CHANGES and key in tests and end.tests[key] * tests[key] < 0
         ]
         if not lost:
             raise ModelError("nothing vanishes between the two itineraries")
-        found = min((self._located(key, step, tests) for key in lost), key=lambda located: located[0])
-        self._add_located(found[1], self.curve.state(found[2].w, found[2].error))
-        self.w, tangent, _, self.jacobian = start
-        self.tangent = -tangent
-        self.tests = self._tests(self.w, self.jacobian, self.tangent)
-        self._keep(state)
+        _, key, there = min((self._located(start, key, end) for key in lost), key=lambda at: at[0])
+        self._add(key[0], key, curve, curve.state(there.w, there.error))
 
     def _why_it_ended(self, error: ModelError) -> str:
-        name, value = self.settings.name, float(self.w[-1])
-        state = self.points[-1].state
-        first = self.points[0].state
+        name, value = self.settings.name, float(self.here.w[-1])
+        first, last = self.points[0].state, self.points[-1].state
         grows = ""
-        if isinstance(state, Cycle) and isinstance(first, Cycle):
-            sizes = [float(np.max(np.abs(np.array(c.itinerary.starts)))) for c in (first, state)]
+        if isinstance(last, Cycle) and isinstance(first, Cycle):
+            sizes = [float(np.max(np.abs(np.array(c.itinerary.starts)))) for c in (first, last)]
             if sizes[1] > 1e3 * sizes[0]:
                 grows = f"; the cycle grows without bound, to {sizes[1]:.3g}"
-            elif state.period > 1e3 * first.period:
-                grows = f"; the period grows without bound, to {state.period:.3g}"
+            elif last.period > 1e3 * first.period:
+                grows = f"; the period grows without bound, to {last.period:.3g}"
         return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
 
 
-def _flow_near(curve: CycleCurve, w: Array, known: Array | None = None) -> Cycle | None:
+def _at_parameter(curve: AnyCurve, w: Array, value: float, scale: Array) -> Step:
+    """Return the point near another one at a value of the parameter."""
+    unit = np.zeros(len(w))
+    unit[-1] = 1.0
+    w = w.copy()
+    w[-1] = value
+    step = corrected(curve, w, scale, unit)
+    step.w[-1] = value
+    return step
+
+
+def _is_real(key: Any, state: State) -> bool:
+    """Whether a zero of a test function is what its code says: a critical pair is complex."""
+    if key[0] == "HB":
+        assert isinstance(state, Equilibrium)
+        values = state.eigenvalues
+        critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
+        return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
+    if key[0] == "NS":
+        assert isinstance(state, Cycle)
+        values = state.nontrivial
+        return bool(abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) > 1e-6)
+    return True
+
+
+def _flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
     """Return the cycle of the flow near a point that need not be one, with the pieces of a run."""
     shooting = curve.shooting
     motions = shooting.motions.with_derivatives_by(())
