@@ -66,3 +66,12 @@ def test_the_reference_names_the_functions_of_numpy() -> None:
 
     page = (DOCS / "reference" / "numpy.md").read_text(encoding="utf-8")
     assert [name for name in fnp.__all__ if f"`{name}`" not in page] == []
+
+
+def test_every_code_of_a_special_point_is_explained() -> None:
+    from filippov.cycles.branch import CODES
+
+    for page in (DOCS / "howto" / "cycles.md", DOCS / "theory" / "sliding_bifurcations.md"):
+        text = page.read_text(encoding="utf-8")
+        known = CODES if page.parent.name == "howto" else set(CODES) - {"UZ", "EP"}
+        assert [code for code in known if f"`{code}`" not in text] == [], page.name
