@@ -243,7 +243,8 @@ class _CurveSide:
         if isinstance(curve, CycleCurve):
             probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
             found.update({p.key: p.value for p in probes})
-        found.update(singular_values_of(curve, w))
+        if self.code != "GR":  # at an impact without speed the multipliers are infinite
+            found.update(singular_values_of(curve, w))
         own = self.special_start.test
         return {
             key: value

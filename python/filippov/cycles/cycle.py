@@ -17,6 +17,7 @@ from filippov.cycles.forcing import (
     common_period,
     depends_on_time,
     forcing_of,
+    refuse_other_period,
 )
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
@@ -248,8 +249,9 @@ class Cycle:
         return self.solution.plot(**options)
 
     def __repr__(self) -> str:
-        stable = "stable" if self.is_stable else "unstable"
         largest = np.max(np.abs(self.nontrivial), initial=0.0)
+        is_neutral = abs(largest - 1.0) < 1e-9
+        stable = "neutral" if is_neutral else "stable" if self.is_stable else "unstable"
         modes = " ".join(str(mode) for mode in self.modes)
         return (
             f"Cycle({stable}, period {self.period:.9g}, modes {modes}, largest multiplier {largest:.6g} in "
@@ -509,8 +511,11 @@ def _from_itinerary(motions: Motions, given: Itinerary | Cycle, period: Any) -> 
 
 def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: int | None) -> Cycle:
     """Run until the motion repeats itself."""
-    forcing: GivenPeriod | InferredPeriod | None = None if period is None else GivenPeriod(period)
-    if forcing is None:
+    forcing: GivenPeriod | InferredPeriod | None = None
+    if period is not None:
+        forcing = GivenPeriod(period)
+        refuse_other_period(motions, forcing.value(motions))
+    else:
         span, solution = _first_span(motions, t0, x)
         steps = np.diff(solution.t)
         ticks = _ticks(motions, t0, x, span)

@@ -7,6 +7,7 @@ Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (20
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,6 +121,8 @@ def continuation(
     [('BE', 0.8), ('BE', 1.0)]
     """
     if not isinstance(parameter, str):
+        if not isinstance(parameter, Sequence) or not all(isinstance(name, str) for name in parameter):
+            raise InputError(f"parameter: a name or a pair of names is needed, not {parameter!r}")
         from filippov.cycles.curves import curve_in_two
 
         return curve_in_two(start, tuple(parameter), bounds, step, max_points=max_points)
@@ -130,6 +133,8 @@ def continuation(
         )
     if isinstance(first, Cycle):
         first = first.from_event()
+    if store is not None and not Path(store).parent.is_dir():
+        raise InputError(f"store: there is no folder {Path(store).parent}")
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
     directions = [-1.0, 1.0]
     if isinstance(start, Special):
@@ -272,7 +277,7 @@ class _Side:
         self.settings, self.direction = settings, direction
         self.points: list[Point] = []
         self.special: list[Special] = []
-        self.reason = "interrupted"
+        self.reason, self.is_stopped = "interrupted", False
         self._go_on(self._position(start, direction), start)
 
     def _position(self, state: State, direction: float) -> _Position:
@@ -285,7 +290,7 @@ class _Side:
         return _Position(curve, w, tangent, self._tests(curve, w, jacobian, tangent))
 
     def _tests(self, curve: AnyCurve, w: Array, jacobian: Array, tangent: Array) -> dict[Any, float]:
-        found = tests_at(curve, w, jacobian, tangent, self.settings.detect)
+        found = tests_at(curve, w, jacobian, tangent)
         for monitor in self.settings.monitors:
             found["UZ", monitor.name] = monitor.value(curve.state(w, 0.0))
         return found
@@ -315,6 +320,8 @@ class _Side:
                 del self.special[n_special:]
                 is_long = ds > (_SHORTEST_STEP if isinstance(self.here.curve, EquilibriumCurve) else 4e-3)
                 if not is_long and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
+                    if self.is_stopped:
+                        return
                     ds = min(self.settings.step, 4 * ds)
                 elif ds > _SHORTEST_STEP:
                     ds *= 0.5
@@ -322,10 +329,43 @@ class _Side:
                     self.reason = self._why_it_ended(error)
                     return
                 continue
-            if not goes_on:
+            if not goes_on or self._closes() or self._vanishes():
                 return
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
         self.reason = f"{self.settings.most} points"
+
+    def _closes(self) -> bool:
+        """Whether the branch has come back to where it started."""
+        if len(self.points) < 6:
+            return False
+        first, before, last = self.points[0], *self.points[-2:]
+        name = self.settings.name
+        value = first.params[name]
+        if (before.params[name] - value) * (last.params[name] - value) > 0:
+            return False
+        try:
+            again = at_value(last.state, name, value)
+        except ModelError:
+            return False
+        if not _is_same(again, first.state):
+            return False
+        self.reason = f"the branch is closed: it comes back to its start at {name} = {value:.6g}"
+        return True
+
+    def _vanishes(self) -> bool:
+        """Whether a cycle without switches has shrunk to an equilibrium, and would grow again inside out."""
+        spans = []
+        for point in self.points[-2:]:
+            state = point.state
+            if not isinstance(state, Cycle) or state.is_forced or len(state.itinerary.legs) > 1:
+                return False
+            spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
+        if len(spans) < 2 or spans[0] @ spans[1] > 0:
+            return False
+        self.points.pop()
+        value = self.points[-1].params[self.settings.name]
+        self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
+        return True
 
     def _is_at_end(self) -> bool:
         """Whether the range ends here, and the branch does not lead into it."""
@@ -354,7 +394,9 @@ class _Side:
     def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
         before, after = self.here.tests, following.tests
-        changed = [key for key, value in after.items() if key in before and value * before[key] < 0]
+        wanted = {*CHANGES, *self.settings.detect}
+        common = [key for key in after if key in before and key[0] in wanted]
+        changed = [key for key in common if after[key] * before[key] < 0]
         found = sorted((self._located(self.here, key, following) for key in changed), key=lambda at: at[0])
         curve = self.here.curve
         for _, key, located in found:
@@ -412,7 +454,8 @@ class _Side:
                 motions, place = curve.shooting.motions, key[2][1]
                 probes = curve.probes(np.append(state._u, state.params[name]))
                 times = [probe.t for probe in probes if probe.key == key]
-                t = times[0] - (0.0 if state.is_forced else state.t0) if times else np.nan
+                since = 0.0 if state.is_forced else state.t0
+                t = (times[0] - since) % state.period if times else np.nan
             else:
                 assert isinstance(curve, EquilibriumCurve)
                 motions, place = curve.motions, key[1]
@@ -446,9 +489,9 @@ class _Side:
         return True
 
     def _goes_beyond_a_vanishing_leg(self, ds: float) -> bool:
-        """Go on behind the point at which a leg vanishes, if there is one; the shorter itinerary locates it."""
+        """Go on behind the point at which a leg vanishes, if there is one."""
         curve, w, tangent, _ = self.here
-        if not isinstance(curve, CycleCurve) or self.settings.switch != "follow":
+        if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
             return False
         scale = curve.scales(w)
         direction = float(np.sign(tangent[-1])) or self.direction
@@ -461,7 +504,10 @@ class _Side:
                 self._locate_behind(back, float(w[-1]))
             except ModelError:
                 continue
-            self._go_on(back.turned(), new)
+            if self.settings.switch == "follow":
+                self._go_on(back.turned(), new)
+            else:
+                self.reason, self.is_stopped = f"{self.special[-1]!r}", True
             return True
         return False
 
@@ -498,6 +544,17 @@ class _Side:
             elif last.period > 1e3 * first.period:
                 grows = f"; the period grows without bound, to {last.period:.3g}"
         return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
+
+
+def _is_same(one: State, other: State) -> bool:
+    """Whether two states are the same, from wherever they start."""
+    if isinstance(one, Cycle) and isinstance(other, Cycle):
+        own, its = (np.sort(np.linalg.norm(np.array(c.itinerary.starts), axis=1)) for c in (one, other))
+        is_as_long = abs(one.period - other.period) < 1e-7 * other.period
+        return is_as_long and len(own) == len(its) and np.allclose(own, its, rtol=1e-6)
+    if isinstance(one, Equilibrium) and isinstance(other, Equilibrium):
+        return one.mode == other.mode and np.allclose(one.y, other.y, rtol=1e-7, atol=1e-9)
+    return False
 
 
 def _at_parameter(curve: AnyCurve, w: Array, value: float, scale: Array) -> Step:
@@ -542,7 +599,8 @@ def _flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
         found = cycle_at(motions, t + half, x, duration, forcing)
     except ModelError:
         return None
-    return found if abs(found.period - duration) < 0.3 * duration else None
+    is_near = abs(found.period - duration) < 0.3 * duration
+    return found if is_near and found.is_admissible else None
 
 
 def _without_leg(

@@ -13,7 +13,14 @@ from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
 from filippov.scalars import positive
 
-__all__ = ["GivenPeriod", "InferredPeriod", "common_period", "depends_on_time", "forcing_of"]
+__all__ = [
+    "GivenPeriod",
+    "InferredPeriod",
+    "common_period",
+    "depends_on_time",
+    "forcing_of",
+    "refuse_other_period",
+]
 
 _PLACES, _CONFIRMED_AT, _MOST_MULTIPLES = 7, 3, 64
 
@@ -64,7 +71,10 @@ class GivenPeriod:
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
-        found = float(self.phase.period_at(motions.params))
+        try:
+            found = float(self.phase.period_at(motions.params))
+        except TypeError as error:
+            raise InputError(f"period: it is a function of parameters by their names: {error}") from None
         if not np.isfinite(found) or found <= 0:
             raise InputError(f"period: it is positive, not {found}")
         return self.multiple * found
@@ -219,7 +229,7 @@ def _size(motions: Motions, count: int = _PLACES) -> float:
 
 def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPeriod | None:
     """Return the shortest period of the right-hand side in an interval, if it has one."""
-    step = shortest / 8
+    step = max(shortest / 8, longest / 40_000)
     count = int(min(longest / step, 40_000))
     size = _size(motions)
     before = [np.inf, np.inf]
@@ -233,6 +243,19 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
                 pass
         before = [before[1], value]
     return None
+
+
+def refuse_other_period(motions: Motions, period: float) -> None:
+    """Refuse a period after which field and switching functions are not the same.
+
+    Raises
+    ------
+    InputError
+        If it is such a one.
+    """
+    left = _difference(motions, period)
+    if np.max(np.abs(left), initial=0.0) > 1e-6 * _size(motions):
+        raise InputError(f"period: field and switching functions are not the same after {period:.9g}")
 
 
 def common_period(motions: Motions, ticks: float) -> float:

@@ -5,7 +5,6 @@ References: Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 10
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ __all__ = ["singular_values_of", "tests_at"]
 
 
 def tests_at(
-    curve: CycleCurve | EquilibriumCurve, w: Array, jacobian: Array, tangent: Array, codes: Collection[str]
+    curve: CycleCurve | EquilibriumCurve, w: Array, jacobian: Array, tangent: Array
 ) -> dict[Any, float]:
     """Return the test functions at a point of a branch, by keys whose first entry is the code."""
     scale = curve.scales(w)
@@ -39,7 +38,7 @@ def tests_at(
     # Along a branch these are sharper than products of multipliers.
     found["PSN" if is_on_surface else "LP",] = float(tangent[-1])
     found["BP",] = float(sign * np.exp(size / len(bordered)))
-    return {key: value for key, value in found.items() if key[0] in codes}
+    return found
 
 
 def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[Any, float]:

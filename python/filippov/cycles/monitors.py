@@ -15,6 +15,10 @@ from filippov.events import Event, accepted_names
 __all__ = ["Monitor", "monitors_of", "of_state"]
 
 _PLACES = 400
+_TAKEN = (
+    *("period", "multipliers", "eigenvalues", "n_zero", "stable", "itinerary", "admissible", "residual"),
+    *("point", "multiplier", "eigenvalue"),
+)
 
 
 class _OfState:
@@ -105,10 +109,13 @@ def monitors_of(given: Mapping[str, Any] | None, state: State) -> tuple[Monitor,
     for name, function in given.items():
         if not (callable(function) or isinstance(function, (Event, _OfState))):
             raise InputError(f"monitor: {name!r} is no function, but {type(function).__name__}")
+        states = state.system.state_names(len(state.y0 if isinstance(state, Cycle) else state.y))
+        if name in (*state.params, *states, *_TAKEN):
+            raise InputError(f"monitor: {name!r} is the name of another quantity of the branch")
         monitor = Monitor(name, function)
         try:
             monitor.value(state)
-        except (TypeError, ValueError) as error:
+        except Exception as error:  # whatever a user's function raises
             raise InputError(f"monitor: {name!r} cannot be evaluated: {error}") from error
         found.append(monitor)
     return tuple(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,8 +15,9 @@ from filippov.errors import InputError, ModelError
 from filippov.options import Options, check_options
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import Solution
-from filippov.solve import solve_quietly
+from filippov.solve import solve_ivp, solve_quietly
 from filippov.system import System
+from filippov.unknown import did_you_mean
 
 __all__ = ["Guard", "GuardsAt", "Instant", "LegEnd", "Mode", "Motions", "Record"]
 
@@ -25,6 +27,10 @@ Mode = tuple[int, ...]
 Guard = tuple[str, int, int]
 
 _DEFAULTS = {"rtol": 1e-12, "atol": 1e-13}
+_NOT_HERE = (
+    *("fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"),
+    *("t_eval", "dense_output", "keep", "wrt", "order", "nonunique", "progress"),
+)
 
 
 class LegEnd(NamedTuple):
@@ -145,6 +151,7 @@ class Motions:
         by: Sequence[str],
         options: Mapping[str, Any],
     ) -> None:
+        _check_names(options)
         self.system, self.n = system, n
         self.options = {**_DEFAULTS, **options}
         self._checked: Options = check_options(self.options, (0.0, 1.0), n)
@@ -283,6 +290,20 @@ class Motions:
             )
             self._held = (p, held)
         return self._held[1]
+
+
+def _check_names(options: Mapping[str, Any]) -> None:
+    """Refuse what is no option of the runs of an analysis.
+
+    Raises
+    ------
+    InputError
+        If there is such a one.
+    """
+    known = [name for name in inspect.signature(solve_ivp).parameters if name not in _NOT_HERE]
+    for name in options:
+        if name not in known:
+            raise InputError(f"{name}: it is not an option here{did_you_mean(name, known)}")
 
 
 def _contiguous(x: Array) -> Array:
