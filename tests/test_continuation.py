@@ -6,6 +6,7 @@ Chaos 13 (2003) 2157.
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import filippov as fl
@@ -383,3 +384,41 @@ def test_an_interrupt_keeps_the_part_that_was_computed(tmp_path: Any) -> None:
     assert 2 < len(partial) < 12
     assert "interrupted" in partial.reason
     assert len(fl.cycles.load_branch(path, friction(omega=0.7))) == len(partial)
+
+
+def test_following_does_not_depend_on_what_is_reported() -> None:
+    cycle = fl.limit_cycle(friction(), [1.0, 2.0])
+    branch = fl.continuation(cycle, "omega", (0.3, 0.9), detect=["LP"])
+    np.testing.assert_allclose(branch.values("omega")[[0, -1]], [0.3, 0.9])
+    assert len(branch.special) == 0
+    stopped = fl.continuation(cycle, "omega", (0.3, 0.9), switch="stop")
+    assert stopped.reasons["above"].startswith("CS")
+
+
+def test_a_cycle_that_shrinks_to_an_equilibrium_ends_there() -> None:
+    def hopf(t: float, z: Any, mu: float = 0.5) -> list[Any]:
+        x, y = z
+        r2 = x**2 + y**2
+        return [(mu - r2) * x - 2 * y, (mu - r2) * y + 2 * x]
+
+    branch = fl.continuation(fl.limit_cycle(fl.System(hopf, n=2), [0.5, 0.0]), "mu", (-1.0, 1.0))
+    assert "shrinks to an equilibrium" in branch.reasons["below"]
+    assert abs(np.min(branch.values("mu"))) < 1e-3
+    assert len(branch) < 400
+
+
+def test_the_period_of_a_forcing_is_found_by_every_method() -> None:
+    for method in ("DOPRI5", "DOP853", "Rodas5P"):
+        cycle = fl.limit_cycle(friction(), [1.0, 2.0], method=method, rtol=1e-9, atol=1e-10, transient=20)
+        assert abs(cycle.period - 6 * np.pi) < 1e-7
+    with pytest.raises(fl.InputError, match="period: field and switching functions are not the same"):
+        fl.limit_cycle(friction(), [1.0, 2.0], period=18.8)
+    with pytest.raises(fl.InputError, match="rtoll: it is not an option here; did you mean 'rtol'"):
+        fl.limit_cycle(friction(), [1.0, 2.0], rtoll=1e-9)
+
+
+def test_cycles_travel() -> None:
+    cycle = fl.limit_cycle(friction(), [1.0, 2.0])
+    again = pickle.loads(pickle.dumps(cycle))
+    np.testing.assert_array_equal(again.y0, cycle.y0)
+    assert again.derivative("F").period == cycle.derivative("F").period

@@ -360,7 +360,12 @@ class _Side:
             if not isinstance(state, Cycle) or state.is_forced or len(state.itinerary.legs) > 1:
                 return False
             spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
-        if len(spans) < 2 or spans[0] @ spans[1] > 0:
+        if len(spans) < 2:
+            return False
+        first = self.points[0].state
+        assert isinstance(first, Cycle)
+        size = np.linalg.norm(first.at(first.t0 + 0.5 * first.period) - first.y0)
+        if spans[0] @ spans[1] > 0 and np.linalg.norm(spans[1]) > 1e-3 * size:
             return False
         self.points.pop()
         value = self.points[-1].params[self.settings.name]

@@ -22,7 +22,7 @@ __all__ = [
     "refuse_other_period",
 ]
 
-_PLACES, _CONFIRMED_AT, _MOST_MULTIPLES = 7, 3, 64
+_PLACES, _CONFIRMED_AT, _MOST_MULTIPLES, _WINDOW = 7, 3, 64, 4000
 
 
 _GIVE_PERIOD = "give period=, a number or a function of the parameters"
@@ -229,16 +229,25 @@ def _size(motions: Motions, count: int = _PLACES) -> float:
 
 def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPeriod | None:
     """Return the shortest period of the right-hand side in an interval, if it has one."""
-    step = max(shortest / 8, longest / 40_000)
-    count = int(min(longest / step, 40_000))
+    step = shortest / 8
+    while step < longest:
+        # Each window begins where the one before ends: a period in it has very many steps.
+        found = _first_dip(motions, step, min(_WINDOW * step, longest))
+        if found is not None:
+            return InferredPeriod(found)
+        step *= _WINDOW / 16
+    return None
+
+
+def _first_dip(motions: Motions, step: float, longest: float) -> float | None:
+    """Return the first time after which the right-hand side is the same, among multiples of a step."""
     size = _size(motions)
     before = [np.inf, np.inf]
-    for k in range(4, count):
-        value = float(np.max(np.abs(_difference_from_start(motions, k * step))))
-        is_dip = before[1] < before[0] and before[1] <= value
-        if is_dip and before[1] < 0.2 * size:
+    for k in range(4, int(longest / step) + 1):
+        value = float(np.max(np.abs(_difference_from_start(motions, k * step)), initial=0.0))
+        if before[1] < before[0] and before[1] <= value and before[1] < 0.2 * size:
             try:
-                return InferredPeriod(_refined(motions, (k - 1) * step))
+                return _refined(motions, (k - 1) * step)
             except ModelError:
                 pass
         before = [before[1], value]

@@ -159,6 +159,18 @@ class Motions:
         self._held: tuple[Array, HeldMotions] | None = None
         self.use(params)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "system": self.system,
+            "n": self.n,
+            "params": self._params,
+            "by": self._by,
+            "options": self.options,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]
+
     @property
     def by(self) -> tuple[str, ...]:
         """The parameters by which derivatives are taken."""
