@@ -83,6 +83,7 @@ RUNS = {
     "ensemble": lambda: WARNING_TWICE.ensemble((0, 1), [[0.0], [1.0]]),
     "sweep": lambda: fl.sweep(WARNING_TWICE, (0, 1), {"z": [0.0, 1.0]}),
     "gradient": lambda: fl.gradient(WARNING_TWICE, (0, 1), [0.0], terminal=lambda t, y: y[0]),
+    "lyapunov": lambda: fl.lyapunov(WARNING_TWICE, (0, 1), [0.0]),
     "basins": lambda: fl.basins(WARNING_TWICE, None, (0, 1), {"z": [0.0, 1.0]}),
     "poincare": lambda: fl.poincare(WARNING_TWICE, HALF, (0, 1), [0.0]),
     "bifurcation_diagram": lambda: fl.bifurcation_diagram(WARNING_TWICE, HALF, (0, 1), [0.0], {"a": [1, 2]}),

@@ -338,7 +338,8 @@ def growth_many(
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
 ) -> tuple[
-    list[tuple[int, str, str, float, _Array, _Array, int, tuple[float, str] | None]], BaseException | None
+    list[tuple[int, str, str, float, _Array, _Array, int, tuple[float, str] | None, list[str]]],
+    BaseException | None,
 ]: ...
 def warning_codes() -> list[str]: ...
 def solve_points(

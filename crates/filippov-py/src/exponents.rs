@@ -17,7 +17,8 @@ use crate::systems::TracedSystem;
 use crate::threads::{on_threads, CHUNK_PER_THREAD};
 
 /// Status, reason, message and last time of a run; the times at which the growth is known, the logarithms of the growth at each of
-/// them, and how many directions are gone; and the time from which on it is not known, with the reason.
+/// them, and how many directions are gone; the time from which on it is not known, with the reason; and the kinds
+/// of its warnings.
 type GrowthRow<'py> = (
     i32,
     String,
@@ -27,6 +28,7 @@ type GrowthRow<'py> = (
     Bound<'py, PyArray2<f64>>,
     usize,
     Option<(f64, &'static str)>,
+    Vec<&'static str>,
 );
 
 type Outcome = Result<(Solution, Growth), Failure>;
@@ -75,7 +77,8 @@ pub fn growth_many<'py>(
                     let nothing = PyArray2::zeros(py, [0, y0.ncols()], false);
                     let (reason, text) = ("wrong_input".to_owned(), error.to_string());
                     let no_time = PyArray1::from_slice(py, &[]);
-                    (-1, reason, text, span.0, no_time, nothing, 0, None)
+                    let none = Vec::new();
+                    (-1, reason, text, span.0, no_time, nothing, 0, None, none)
                 }
                 Err(failure) => return Err(failure.into()),
             };
@@ -119,6 +122,7 @@ fn row_of<'py>(
         sums,
         growth.n_gone,
         growth.lost.map(|(t, lost)| (t, lost.name())),
+        solution.warnings.iter().map(|w| w.code.name()).collect(),
     ))
 }
 

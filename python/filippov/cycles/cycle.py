@@ -25,6 +25,7 @@ from filippov.cycles.shooting import Period, Shooting, Shot, solve
 from filippov.errors import InputError, ModelError
 from filippov.events import Event, accepted_names
 from filippov.modes import Mode
+from filippov.notices import show_warnings
 from filippov.options import check_time, check_y0
 from filippov.solution import Solution
 from filippov.system import System
@@ -414,7 +415,10 @@ def limit_cycle(
         found = cycle_at(motions, t0, start, float(period), None)
     else:
         found = _simulated(motions, t0, start, period, transient)
-    return _moved_to(found, anchor, t0)
+    moved = _moved_to(found, anchor, t0)
+    if motions.warnings:
+        show_warnings(motions.warnings, moved.solution)
+    return moved
 
 
 def cycle_at(

@@ -25,6 +25,7 @@ from filippov.cycles.motions import Array
 from filippov.derivatives import refuse_without_derivatives
 from filippov.ensemble import check_threads
 from filippov.errors import InputError, Interrupted
+from filippov.notices import show_summary
 from filippov.options import Options
 from filippov.prepare import Prepared
 from filippov.scalars import count
@@ -148,6 +149,8 @@ def lyapunov(
             rows += _rows_of(work, own, y0_rows[chosen], p_rows[chosen])
     found = _dataset(xarray, grid, rows, anchor is not None)
     _warn_of_failures(rows)
+    where = "a run with System.solve has them in its warnings"
+    show_summary((row.codes for row in rows if row.codes), len(rows), "runs", where, found)
     return found
 
 
@@ -177,6 +180,7 @@ class _Row(NamedTuple):
     status: int
     reason: str
     message: str
+    codes: list[str]
 
 
 class _Window(NamedTuple):
@@ -223,7 +227,8 @@ def _rows_of(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Row]
             reason, text = window.failure or ("wrong_input", "y0, params: must be finite")
             rows.append(_failed(work.grid, work.span[0], reason, text))
             continue
-        status, reason, text, t_last, times, sums, n_gone, lost = next(given)
+        status, reason, text, t_last, times, sums, n_gone, lost, codes = next(given)
+        codes = [*dict.fromkeys([*codes, *(code for code, _ in prepared.warnings)])]
         if lost is not None:
             status, reason, t_last = -1, f"no_derivative ({lost[1]})", lost[0]
             text = f"From t = {lost[0]:.6g} on the derivative of the state is not known ({lost[1]})."
@@ -232,7 +237,7 @@ def _rows_of(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Row]
         exponent, error = _means(times, sums, len(work.grid.states))
         start = float(times[0]) if len(times) else math.nan
         returns = window.n_returns, window.return_time
-        rows.append(_Row(exponent, error, n_gone, start, t_last, *returns, status, reason, text))
+        rows.append(_Row(exponent, error, n_gone, start, t_last, *returns, status, reason, text, codes))
     return rows
 
 
@@ -324,12 +329,12 @@ def _means(times: Array, sums: Array, n: int) -> tuple[Array, Array]:
 
 def _failed(grid: Grid, t0: float, reason: str, message: str) -> _Row:
     nothing = np.full(len(grid.states), np.nan)
-    return _Row(nothing, nothing, 0, math.nan, t0, 0, math.nan, -1, reason, message)
+    return _Row(nothing, nothing, 0, math.nan, t0, 0, math.nan, -1, reason, message, [])
 
 
 def _dataset(xarray: Any, grid: Grid, rows: list[_Row], has_section: bool) -> Any:
     variables: dict[str, Any] = {}
-    for name in _Row._fields:
+    for name in _Row._fields[:-1]:
         if name in ("n_returns", "return_time") and not has_section:
             continue
         values = [getattr(row, name) for row in rows]

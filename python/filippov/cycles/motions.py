@@ -16,6 +16,7 @@ from filippov.options import Options, check_options
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import Solution
 from filippov.solve import solve_ivp, solve_quietly
+from filippov.switches import RunWarning
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
@@ -27,6 +28,8 @@ Mode = tuple[int, ...]
 Guard = tuple[str, int, int]
 
 _DEFAULTS = {"rtol": 1e-12, "atol": 1e-13}
+# Starts at any place of a cycle are one-sided, and their sides are known from its pieces.
+_OF_DERIVATIVES = ("one_sided", "no_derivative", "no_second_derivative", "against_direction")
 _NOT_HERE = (
     *("fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"),
     *("t_eval", "dense_output", "keep", "wrt", "order", "nonunique", "progress"),
@@ -157,6 +160,8 @@ class Motions:
         self._checked: Options = check_options(self.options, (0.0, 1.0), n)
         self._by = tuple(by)
         self._held: tuple[Array, HeldMotions] | None = None
+        # Those of all runs; copies add to the same list.
+        self.warnings: list[RunWarning] = []
         self.use(params)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -255,7 +260,9 @@ class Motions:
 
     def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
         """Run the system with these parameters."""
-        return solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
+        found = solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
+        self.warnings += (w for w in found.warnings if w.code not in _OF_DERIVATIVES)
+        return found
 
     def record(self, t_span: tuple[float, float], x: Array) -> Record:
         """Run the system, and return the run with its instants.
