@@ -1,4 +1,4 @@
-"""Regularised systems: smooth functions in the place of signs."""
+"""Regularised systems: smooth functions replace the signs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KINDS = ("tanh", "linear")
 
 
 def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared:
-    """Return a system of the core with a smooth function in the place of every sign.
+    """Return a system of the core in which a smooth function replaces every sign.
 
     Parameters
     ----------

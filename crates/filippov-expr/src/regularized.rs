@@ -1,4 +1,4 @@
-//! Expressions with functions in the place of signs: the regularised system of a piecewise-smooth one.
+//! The regularised system of a piecewise-smooth one: smooth functions replace its signs.
 
 use rustc_hash::FxHashMap;
 

@@ -443,7 +443,7 @@ impl TracedSystem {
         self.law_names()
     }
 
-    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign, `eps` its last parameter.
+    /// The system in which a function of `kappa[j] * h_j / eps` replaces every sign; `eps` is its last parameter.
     fn regularized(&self, eps: &str, kappa: Vec<f64>, is_linear: bool) -> PyResult<Self> {
         if kappa.len() != self.system.n_surfaces() || !self.law_names().is_empty() {
             return Err(PyValueError::new_err(

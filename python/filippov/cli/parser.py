@@ -100,17 +100,36 @@ def _add_demo(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -
     command.set_defaults(run=commands.demo)
 
 
-def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _command_with_a_model(
+    subparsers: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    *,
+    help: str,
+    description: str,
+    epilog: str,
+) -> argparse.ArgumentParser:
+    """Return the parser of a command that takes a model, and numbers for it."""
     command = subparsers.add_parser(
+        name,
+        help=help,
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
+    command._negative_number_matcher = re.compile(r"-\.?\d")
+    return command
+
+
+def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = _command_with_a_model(
+        subparsers,
         "solve",
         help="solve a model of your own",
         description="Solve an initial value problem; print what happened, draw and save it.",
         epilog=_SOLVE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_run_options(command)
-    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
-    command._negative_number_matcher = re.compile(r"-\.?\d")
     out = command.add_argument_group("what comes out")
     out.add_argument("--plot", type=Path, metavar="FILE", help="draw the states over time: .png, .pdf, .svg")
     out.add_argument("--states", nargs="+", metavar="NAME", help="draw these states only")
@@ -137,16 +156,14 @@ cut, goes on when the same command is given again; nothing is done twice, the re
 
 
 def _add_sweep(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    command = subparsers.add_parser(
+    command = _command_with_a_model(
+        subparsers,
         "sweep",
         help="solve a model over a grid of parameters and initial states",
         description="Solve a model over a grid of parameters and initial states; draw and save it.",
         epilog=_SWEEP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_run_options(command)
-    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
-    command._negative_number_matcher = re.compile(r"-\.?\d")
     add_sweep_options(command)
     command.set_defaults(run=sweep)
 
@@ -162,15 +179,13 @@ initial state is a guess, and the cycle may be unstable; without forcing --perio
 
 
 def _add_cycle(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    command = subparsers.add_parser(
+    command = _command_with_a_model(
+        subparsers,
         "cycle",
         help="find a limit cycle, its period and multipliers",
         description="Find the limit cycle that a run comes to; print its period, multipliers and pieces.",
         epilog=_CYCLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
-    command._negative_number_matcher = re.compile(r"-\.?\d")
     add_cycle_options(command)
     command.set_defaults(run=cycle)
 
@@ -189,14 +204,12 @@ switching- and adding-sliding, GR grazing of a reset, EP end.
 
 
 def _add_continue(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    command = subparsers.add_parser(
+    command = _command_with_a_model(
+        subparsers,
         "continue",
         help="follow a cycle or an equilibrium in a parameter",
         description="Follow a cycle or an equilibrium in a parameter; print where it changes.",
         epilog=_CONTINUE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
-    command._negative_number_matcher = re.compile(r"-\.?\d")
     add_continue_options(command)
     command.set_defaults(run=continue_)

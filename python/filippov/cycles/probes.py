@@ -1,6 +1,6 @@
 """Test functions of a cycle with a given itinerary: positive while the flow follows it.
 
-Each is a smooth function of the equations of the itinerary, which goes on where the flow takes another way.
+Each is smooth in the unknowns of the itinerary, also beyond the point at which the flow leaves that.
 References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and
 8; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
 """

@@ -78,7 +78,7 @@ impl Definition {
         self.names.parameters.len().saturating_sub(n_laws)
     }
 
-    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign. The width `eps` becomes its last parameter.
+    /// The system in which a function of `kappa[j] * h_j / eps` replaces every sign. The width `eps` becomes its last parameter.
     /// It has no laws and no watched surfaces: the caller refuses systems that have any.
     #[must_use]
     pub fn regularized(&self, eps: &str, kappa: &[f64], ramp: Ramp) -> Self {
