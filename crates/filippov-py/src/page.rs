@@ -56,11 +56,7 @@ impl PageModel {
 
 /// The reply of a model to a request.
 #[pyfunction]
-pub fn answer_page<'py>(
-    py: Python<'py>,
-    model: &PageModel,
-    request: &[u8],
-) -> Bound<'py, PyBytes> {
+pub fn answer_page<'py>(py: Python<'py>, model: &PageModel, request: &[u8]) -> Bound<'py, PyBytes> {
     model.answer(py, request)
 }
 
