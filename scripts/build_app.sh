@@ -6,7 +6,7 @@ set -eu
 CARGO=${CARGO:-cargo}
 static=python/filippov/app/static
 target=wasm32-unknown-unknown
-built=target/$target/web/filippov_web.wasm
+built=target/$target/web
 
 skip() {
     echo "skipped: $1"
@@ -28,10 +28,10 @@ debian_rustc() {
 
 build_engine() {
     if has_target || { command -v rustup >/dev/null 2>&1 && rustup target add $target; }; then
-        "$CARGO" build --profile web --target $target -p filippov-web
+        "$CARGO" build --profile web --target $target -p filippov-web -p filippov-text
     elif debian_rustc; then
         RUSTC=$compiler RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$linker \
-            "$CARGO" build --profile web --target $target -p filippov-web -Zbuild-std=std,panic_abort
+            "$CARGO" build --profile web --target $target -p filippov-web -p filippov-text -Zbuild-std=std,panic_abort
     else
         skip "the engine of the page needs the Rust target $target" \
             "with rustup: rustup target add $target" \
@@ -39,8 +39,11 @@ build_engine() {
         return
     fi
     mkdir -p $static
-    cp $built $static/filippov.wasm
-    echo "$static/filippov.wasm: $(gzip -9 -c $static/filippov.wasm | wc -c) bytes, compressed"
+    for module in web text; do
+        case $module in web) name=filippov ;; text) name=filippov_text ;; esac
+        cp $built/filippov_$module.wasm $static/$name.wasm
+        echo "$static/$name.wasm: $(gzip -9 -c $static/$name.wasm | wc -c) bytes, compressed"
+    done
 }
 
 build_front() {
