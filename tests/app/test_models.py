@@ -226,6 +226,8 @@ def test_the_kernel_continues_an_equilibrium() -> None:
     ("request_", "message"),
     [
         (b"run", "^the request is no JSON"),
+        (b"[" * 100_000, "^the request is no JSON"),
+        (b"\xff\xfe", "^the request is no JSON"),
         (b"[1]", "^kind: None is none of describe, run"),
         (b'{"kind": "exec"}', "^kind: 'exec' is none of"),
         (b'{"kind": "run", "y0": [1]}', "y0"),

@@ -65,7 +65,7 @@ class Engine:
         """Return the reply to a request, both as bytes."""
         try:
             given = json.loads(request)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             return failure(f"the request is no JSON: {error}", "request")
         kind = given.get("kind") if isinstance(given, dict) else None
         if not isinstance(kind, str) or kind not in self.kinds:
