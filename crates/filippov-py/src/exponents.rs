@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use filippov::action::Actions;
 use filippov::derivative::{Exponents, Extension, Growth};
-use filippov::{Options, Problem, Solution, Stop};
+use filippov::{message_of, Options, Problem, Solution, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 
 use crate::derivatives::Failure;
 use crate::prepared_run::{ActionRow, PreparedRun};
-use crate::run::{is_interruption, message_of, status_of, take_error};
+use crate::run::{is_interruption, take_error};
 use crate::solve::RunOptions;
 use crate::systems::TracedSystem;
 use crate::threads::{on_threads, CHUNK_PER_THREAD};
@@ -114,7 +114,7 @@ fn row_of<'py>(
         false => PyArray2::from_vec2(py, &growth.sums)?,
     };
     Ok((
-        status_of(&solution.stop),
+        solution.stop.status(),
         solution.stop.name().to_owned(),
         message,
         solution.t_last,

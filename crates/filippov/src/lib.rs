@@ -106,7 +106,7 @@ pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
-    classify, contradicts, hidden_dynamics, intersection_field, leg, not_finite, state_text,
+    classify, contradicts, hidden_dynamics, intersection_field, leg, message_of, not_finite, state_text,
     Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, Leg, LegError,
     NotFinitePlace, Over, PointKind,
 };
@@ -118,7 +118,7 @@ pub use record::{
     DecisionRecord, Gradient, Held, InstantRecord, ObservedStep, Observer, Piece, Segment, Side,
     Solution, StartingZero,
 };
-pub use saved::{RunnableSystem, SavedAction, SavedSystem};
+pub use saved::{ReadySystem, RunnableSystem, SavedAction, SavedSystem};
 pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
