@@ -5,7 +5,7 @@ models of all reference problems, ``PROBLEM.html`` for each, and ``problems.md``
 was not built, the overview says so, and is all that is written.
 
 A browser fetches no files for a page that was itself opened from a folder. There the same files come as
-scripts (``embedded/``), and ``folder.js`` hands them to the page in place of the fetched ones.
+scripts (``embedded/``), which ``folder.js`` loads.
 """
 
 from __future__ import annotations
@@ -23,11 +23,10 @@ from filippov.errors import ModelError
 
 BODY, SCRIPT = "<body", f'<script type="module" src="{FRONT}"></script>'
 FROM_A_FOLDER = """\
-// A page that was opened from a folder: its files come as scripts.
+// A page that was opened from a folder: its files come as scripts, which put them into `filippovFiles`.
 "use strict";
 if (location.protocol === "file:") {
   const files = (globalThis.filippovFiles = {});
-  const bytes = (name) => Uint8Array.from(atob(files[name]), (letter) => letter.charCodeAt(0));
   const load = (name) =>
     new Promise((resolve) => {
       const script = document.createElement("script");
@@ -35,17 +34,10 @@ if (location.protocol === "file:") {
       script.onload = script.onerror = () => resolve();
       document.head.append(script);
     });
-  const types = { js: "text/javascript", wasm: "application/wasm", json: "application/json" };
-  const type = (name) => types[name.split(".").pop()] ?? "application/octet-stream";
-  const response = (name) => new Response(bytes(name), { headers: { "Content-Type": type(name) } });
-  globalThis.fetch = async (asked) => {
-    const name = String(asked);
-    if (!(name in files)) await load(name);
-    return name in files ? response(name) : new Response(null, { status: 404 });
-  };
   const start = async () => {
-    await load("%(front)s");
-    await import(URL.createObjectURL(await response("%(front)s").blob()));
+    await Promise.all(%(names)s.map(load));
+    const text = Uint8Array.from(atob(files["%(front)s"]), (letter) => letter.charCodeAt(0));
+    await import(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   };
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
   else start();
@@ -87,7 +79,6 @@ def write_pages(folder: Path) -> None:
         raise SystemExit(f"index.html of the page has not one {BODY!r} and one {SCRIPT!r}")
     index = index.replace(SCRIPT, f'<script src="folder.js"></script>\n    {SCRIPT}')
     (folder / "index.html").write_text(index, encoding="utf-8")
-    (folder / "folder.js").write_text(FROM_A_FOLDER % {"front": FRONT}, encoding="utf-8")
     (folder / "models").mkdir()
     names = [name for name in problems.names() if _write_model(name, folder)]
     rows = [{"name": name, "title": name.replace("_", " ")} for name in names]
@@ -114,15 +105,19 @@ def _write_model(name: str, folder: Path) -> bool:
 
 
 def _embed(folder: Path) -> None:
-    """Write what the page fetches as scripts too."""
-    models = [f"models/{path.name}" for path in (folder / "models").iterdir()]
-    for name in (FRONT, ENGINE, "filippov_text.wasm", *models):
-        path = folder / name
-        if path.is_file():
-            target = folder / "embedded" / f"{name}.js"
-            target.parent.mkdir(parents=True, exist_ok=True)
-            text = base64.b64encode(path.read_bytes()).decode()
-            target.write_text(f'globalThis.filippovFiles[{json.dumps(name)}] = "{text}";\n', encoding="utf-8")
+    """Write what the page fetches as scripts too: the built files one by one, the models together."""
+    models = [f"models/{path.name}" for path in sorted((folder / "models").iterdir())]
+    scripts = {name: [name] for name in (FRONT, ENGINE, "filippov_text.wasm") if (folder / name).is_file()}
+    scripts["models"] = models
+    (folder / "embedded").mkdir()
+    for script, names in scripts.items():
+        lines = []
+        for name in names:
+            text = base64.b64encode((folder / name).read_bytes()).decode()
+            lines.append(f'globalThis.filippovFiles[{json.dumps(name)}] = "{text}";\n')
+        (folder / "embedded" / f"{script}.js").write_text("".join(lines), encoding="utf-8")
+    loader = FROM_A_FOLDER % {"names": json.dumps(list(scripts)), "front": FRONT}
+    (folder / "folder.js").write_text(loader, encoding="utf-8")
 
 
 if __name__ == "__main__":
