@@ -192,6 +192,7 @@ def test_models_of_the_reference_problems_are_there(server: Server) -> None:
     [
         ("POST", "/ask", {"Content_Length": None}, 411),
         ("POST", "/ask", {"Content_Length": "-1"}, 411),
+        ("POST", "/ask", {"Content_Length": "0", "Transfer_Encoding": "chunked"}, 411),
         ("POST", "/ask", {"Content_Length": "1e3"}, 411),
         ("POST", "/ask", {"Content_Length": "9" * 40}, 411),
         ("POST", "/ask", {"Content_Length": str(MOST_BYTES + 1)}, 413),

@@ -75,6 +75,8 @@ def test_values_set_in_python_reach_the_page(widget: Any) -> None:
         ("y0", [0.0, 1.0]),
     ]
     assert widget.get_state("y0") == {"y0": [0.0, 1.0]}
+    widget.params = {"omega": 0.5}
+    assert widget.params == {"F": 1.0, "omega": 0.5}
 
 
 @pytest.mark.parametrize(

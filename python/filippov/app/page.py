@@ -115,6 +115,13 @@ class Page(NamedTuple):
         ------
         ModelError
             If the system needs Python for its runs.
+
+        Examples
+        --------
+        >>> from filippov.app import Page, make_page
+        >>> data = make_page("dry_friction").to_bytes()
+        >>> Page.from_bytes(data).title, len(data) < 1000
+        ('dry friction', True)
         """
         why = self.why_it_stays()
         if why:
@@ -195,6 +202,13 @@ def make_page(
         If an argument is wrong; the message names it.
     ModelError, TraceError
         If the system cannot be made or run.
+
+    Examples
+    --------
+    >>> from filippov.app import make_page
+    >>> page = make_page("dry_friction", params={"F": (0, 2), "omega": 0.5})
+    >>> page.ranges, page.params
+    ({'F': (0.0, 2.0)}, {'F': 0.4, 'omega': 0.5})
     """
     problem = _problem(shown)
     system = problem.system() if problem is not None else _system(shown)

@@ -24,7 +24,15 @@ Array = npt.NDArray[np.float64]
 
 
 class Reply(NamedTuple):
-    """A reply: its header without the places of the arrays, and the arrays by name."""
+    """A reply: its header without the places of the arrays, and the arrays by name.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from filippov.app.reply import Reply, read_reply
+    >>> read_reply(Reply({"ok": True}, {"t": np.arange(2.0)}).to_bytes()).arrays["t"].tolist()
+    [0.0, 1.0]
+    """
 
     header: dict[str, Any]
     arrays: dict[str, Array]

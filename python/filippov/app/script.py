@@ -32,6 +32,20 @@ def write_script(
     -------
     str
         The run of the script has the same tolerances and the same method, so it takes the same steps.
+
+    Examples
+    --------
+    >>> from filippov.app import make_page, write_script
+    >>> print(write_script(make_page("biased_relay")).split("print")[0])
+    import filippov as fl
+    <BLANKLINE>
+    system = fl.problems.get("biased_relay").system()
+    <BLANKLINE>
+    y0 = [1.0]
+    params = {}
+    sol = system.solve((0.0, 3.0), y0, params, rtol=1e-06, atol=1e-09)
+    <BLANKLINE>
+    <BLANKLINE>
     """
     start = [float(value) for value in (page.y0 if y0 is None else y0)]
     span = tuple(float(end) for end in (page.t_span if t_span is None else t_span))
@@ -55,7 +69,7 @@ def _picture(page: Page) -> list[str]:
 
 def _system(page: Page) -> list[str]:
     if page.reference is not None:
-        return ["import filippov as fl", "", f"system = fl.problems.get({page.reference!r}).system()"]
+        return ["import filippov as fl", "", f'system = fl.problems.get("{page.reference}").system()']
     name = _last_function(page.text) if page.text else None
     if page.text and name:
         return [

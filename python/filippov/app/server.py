@@ -234,6 +234,8 @@ class _Handler(BaseHTTPRequestHandler):
         return _Answer(HTTPStatus.OK, self.owner.engine.answer(self.rfile.read(length)), _BYTES)
 
     def _length(self) -> int | None:
+        if "Transfer-Encoding" in self.headers:
+            return None
         text = self.headers.get("Content-Length", "")
         return int(text) if text.isascii() and text.isdigit() and len(text) < 16 else None
 
@@ -262,6 +264,9 @@ class _Handler(BaseHTTPRequestHandler):
         )
 
     def _send(self, answer: _Answer) -> None:
+        is_refused = answer.status >= HTTPStatus.BAD_REQUEST
+        if is_refused and (self._length() or 0) <= MOST_BYTES:
+            self.rfile.read(self._length() or 0)  # else the answer may be lost with what was not read
         self.send_response(answer.status)
         headers = {
             "Content-Type": answer.kind,
@@ -275,8 +280,8 @@ class _Handler(BaseHTTPRequestHandler):
         }
         if answer.allow:
             headers["Allow"] = answer.allow
-        if answer.status >= HTTPStatus.BAD_REQUEST:
-            headers["Connection"] = "close"  # what else was sent is not read
+        if is_refused:
+            headers["Connection"] = "close"
         if answer.status == HTTPStatus.NO_CONTENT:
             del headers["Content-Type"], headers["Content-Length"]
         for name, value in headers.items():

@@ -35,7 +35,8 @@ class Explorer(anywidget.AnyWidget):
     Attributes
     ----------
     params : dict of str to float
-        Values of the parameters: those of the sliders. Set them, and the page follows.
+        Values of the parameters: those of the sliders. Set them, and the page follows; those that are left
+        out stay as they are.
     y0 : list of float
         Initial state, likewise.
     t_span : list of float
@@ -89,9 +90,10 @@ class Explorer(anywidget.AnyWidget):
 
     @traitlets.validate("params")
     def _check_params(self, proposal: Any) -> dict[str, float]:
-        given = proposal["value"]
-        changed = self._page.system.parameter_values(_mapping(given))
-        return {name: changed[name] if name in given else old for name, old in self._page.params.items()}
+        given = _mapping(proposal["value"])
+        changed = self._page.system.parameter_values(given)
+        before = {**self._page.params, **self.params}
+        return {name: changed[name] if name in given else value for name, value in before.items()}
 
     @traitlets.validate("y0")
     def _check_y0(self, proposal: Any) -> list[float]:
