@@ -91,6 +91,19 @@ def test_a_system_without_a_page_has_none_and_gets_one() -> None:
     assert page_of(again) == '{"title": "b"}'
 
 
+def test_discrete_states_and_resets_travel() -> None:
+    shift = fl.Reset(lambda t, x: x[0] - 0.5, direction="down", set={"gear": 3.0}, name="shift")
+    box = fl.System(lambda t, x, gear: [-gear * x[0]], n=1, discrete={"gear": 1.0}, resets=shift)
+    page = make_page(box, [1.0], (0, 2))
+    model = PageModel(page.to_bytes())
+    described = asked(model, "describe").header
+    assert (described["discrete"], described["actions"]) == (["gear"], ["shift"])
+    expected = box.solve((0, 2), [1.0])
+    found = asked(model, "run").header
+    assert found["end"] == expected.y[:, -1].tolist()
+    assert [row["kind"] for row in found["switches"]] == expected.switches.kind.tolist() == ["reset"]
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [

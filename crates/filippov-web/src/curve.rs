@@ -183,7 +183,10 @@ impl Sampler<'_> {
         for place in 1..count {
             let from_anchor = |anchor: usize, i: usize| {
                 let dt = points.t[place] - points.t[anchor];
-                (self.state(points, place)[i] - self.state(points, anchor)[i], dt)
+                (
+                    self.state(points, place)[i] - self.state(points, anchor)[i],
+                    dt,
+                )
             };
             let passes = |anchor: usize, doors: &[(f64, f64)]| {
                 doors.iter().enumerate().all(|(i, &(low, high))| {

@@ -38,7 +38,10 @@ impl Window {
         let found = request.exactly::<4>("box")?;
         let [x0, x1, y0, y1] = request.needed("box", found)?;
         if !(x0 < x1 && y0 < y1) {
-            return Err(request.wrong("box", "[x0, x1, y0, y1] with x0 < x1 and y0 < y1 are needed"));
+            return Err(request.wrong(
+                "box",
+                "[x0, x1, y0, y1] with x0 < x1 and y0 < y1 are needed",
+            ));
         }
         let rest = match request.numbers("rest")? {
             Some(rest) => Some(rest),
@@ -48,7 +51,9 @@ impl Window {
         if rest.len() != n {
             return Err(request.wrong("rest", &format!("{n} numbers are needed, one per state")));
         }
-        let cells = request.count("cells", MOST_CELLS)?.map_or(cells, |cells| cells as usize);
+        let cells = request
+            .count("cells", MOST_CELLS)?
+            .map_or(cells, |cells| cells as usize);
         if cells == 0 {
             return Err(request.wrong("cells", "must be positive"));
         }

@@ -93,9 +93,7 @@ fn options_of(page: &Request, request: &Request, keep: Keep) -> Result<Options, 
         None => page.text("method")?,
     };
     let method = method.map_or(Ok(Method::Auto), |name| {
-        let known = Method::ALL
-            .into_iter()
-            .find(|method| method.name() == name);
+        let known = Method::ALL.into_iter().find(|method| method.name() == name);
         let names = Method::ALL.map(Method::name).join(", ");
         known.ok_or_else(|| request.wrong("method", &format!("{name:?} is none of {names}")))
     })?;

@@ -47,7 +47,10 @@ impl SectionRequest {
             Where::Surface {
                 index: section.needed("surface", index)?,
                 direction: direction as i8,
-                kind: section.text("kind")?.map(|name| kind_of(&section, name)).transpose()?,
+                kind: section
+                    .text("kind")?
+                    .map(|name| kind_of(&section, name))
+                    .transpose()?,
             }
         } else if section.get("state").is_some() {
             let index = section.choice("state", &model.description.states)?;

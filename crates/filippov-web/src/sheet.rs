@@ -144,7 +144,8 @@ impl Plane<'_> {
                         let place = match lines.places.get(&name) {
                             Some(&place) => place,
                             None => {
-                                let ends = [name.0, name.1].map(|end| (corner(end.0, end.1), at(end)));
+                                let ends =
+                                    [name.0, name.1].map(|end| (corner(end.0, end.1), at(end)));
                                 let place = self.zero_between(j, ends)?;
                                 let place = place.map(|point| lines.add(point));
                                 lines.places.insert(name, place);
@@ -199,7 +200,12 @@ impl Plane<'_> {
     }
 
     /// A point of a surface with the normal components there.
-    fn at_surface(&self, j: usize, point: [f64; 2], both: &mut BothSides) -> Result<(SheetPoint, bool), FieldError> {
+    fn at_surface(
+        &self,
+        j: usize,
+        point: [f64; 2],
+        both: &mut BothSides,
+    ) -> Result<(SheetPoint, bool), FieldError> {
         let x = self.window.state(point);
         let mut signs = self.signs(&x)?;
         let mut is_active = false;

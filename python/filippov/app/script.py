@@ -36,16 +36,14 @@ def write_script(
     Examples
     --------
     >>> from filippov.app import make_page, write_script
-    >>> print(write_script(make_page("biased_relay")).split("print")[0])
+    >>> print(write_script(make_page("biased_relay")).partition("print")[0].strip())
     import filippov as fl
     <BLANKLINE>
     system = fl.problems.get("biased_relay").system()
     <BLANKLINE>
     y0 = [1.0]
-    params = {}
-    sol = system.solve((0.0, 3.0), y0, params, rtol=1e-06, atol=1e-09)
-    <BLANKLINE>
-    <BLANKLINE>
+    params = {'bias': 0.3}
+    sol = system.solve((0.0, 10.0), y0, params, rtol=1e-06, atol=1e-09)
     """
     start = [float(value) for value in (page.y0 if y0 is None else y0)]
     span = tuple(float(end) for end in (page.t_span if t_span is None else t_span))

@@ -48,14 +48,20 @@ pub fn basins(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         true => {
             let nearest = |end: &Vec<f64>| nearest(&targets, end, &reach);
             let groups: Vec<usize> = good.iter().map(nearest).collect();
-            (groups, sentences(model, &targets.iter().map(|t| vec![t]).collect::<Vec<_>>()))
+            (
+                groups,
+                sentences(model, &targets.iter().map(|t| vec![t]).collect::<Vec<_>>()),
+            )
         }
         false => {
             let groups = clusters(&good, &reach);
             let count = groups.iter().max().map_or(0, |last| last + 1);
             let members = |group: usize| {
                 let pairs = good.iter().zip(&groups);
-                pairs.filter(|(_, &own)| own == group).map(|(end, _)| end).collect()
+                pairs
+                    .filter(|(_, &own)| own == group)
+                    .map(|(end, _)| end)
+                    .collect()
             };
             let members: Vec<Vec<&Vec<f64>>> = (0..count).map(members).collect();
             (groups, sentences(model, &members))
@@ -79,8 +85,8 @@ fn reach_of(window: &Window, ends: &[Vec<f64>], n: usize) -> Vec<f64> {
     let mut reach: Vec<f64> = (0..n)
         .map(|i| {
             let values = || ends.iter().map(|end| end[i]);
-            let extent = values().fold(f64::NEG_INFINITY, f64::max)
-                - values().fold(f64::INFINITY, f64::min);
+            let extent =
+                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
             NEAR * extent.max(f64::MIN_POSITIVE)
         })
         .collect();
@@ -101,7 +107,9 @@ fn targets_of(model: &Model, request: &Request) -> Result<Vec<Vec<f64>>, Refusal
     let list = list.filter(|list| !list.is_empty()).ok_or_else(wrong)?;
     let state = |value: &serde_json::Value| {
         let entries = value.as_array()?.iter().map(serde_json::Value::as_f64);
-        entries.collect::<Option<Vec<f64>>>().filter(|state| state.len() == n)
+        entries
+            .collect::<Option<Vec<f64>>>()
+            .filter(|state| state.len() == n)
     };
     let states: Option<Vec<Vec<f64>>> = list.iter().map(state).collect();
     states.ok_or_else(wrong)

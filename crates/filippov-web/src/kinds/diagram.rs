@@ -13,14 +13,22 @@ use crate::section_request::SectionRequest;
 pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     let wanted = RunRequest::read(model, request, Keep::Last)?;
     let section = SectionRequest::read(model, request)?;
-    let names: Vec<String> = model.description.params.iter().map(|p| p.name.clone()).collect();
+    let names: Vec<String> = model
+        .description
+        .params
+        .iter()
+        .map(|p| p.name.clone())
+        .collect();
     let parameter = request.needed("parameter", request.choice("parameter", &names)?)?;
     if model.description.is_pinned {
         let requirement = "the model was traced for one value and holds for no other";
         return Err(request.wrong("parameter", requirement));
     }
     let values = request.needed("values", request.numbers("values")?)?;
-    if section.n_periods().is_some_and(|n| n > 1 && n != values.len()) {
+    if section
+        .n_periods()
+        .is_some_and(|n| n > 1 && n != values.len())
+    {
         let requirement = "section.period: as many periods as values are needed, or one";
         return Err(Refusal::request(requirement));
     }
@@ -57,11 +65,18 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         }
         for found in solution.returns.iter().flat_map(|returns| &returns.kept) {
             let row = [value, found.y[coordinate], index as f64];
-            points.iter_mut().zip(row).for_each(|(list, entry)| list.push(entry));
+            points
+                .iter_mut()
+                .zip(row)
+                .for_each(|(list, entry)| list.push(entry));
         }
         if carries && solution.stop.is_success() {
             // At a clock the next run starts in the same phase.
-            t_start = if section.n_periods().is_some() { t0 } else { solution.t_last };
+            t_start = if section.n_periods().is_some() {
+                t0
+            } else {
+                solution.t_last
+            };
             start = solution.last_state().to_vec();
         }
     }

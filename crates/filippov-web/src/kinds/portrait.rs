@@ -56,7 +56,10 @@ pub fn portrait(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     let mut reply = Reply::new("portrait");
     let resting = match system.depends_on_time() {
         true => {
-            reply.set("note", "the field depends on the time: it has no equilibria");
+            reply.set(
+                "note",
+                "the field depends on the time: it has no equilibria",
+            );
             Vec::new()
         }
         false => equilibria(&plane, &sheets, model.n_visible())?,

@@ -23,7 +23,10 @@ fn returns_to_a_surface_and_to_a_value() {
     let switches = run.header["switches"].as_array().unwrap();
     let arrivals = switches.iter().filter(|s| s["from"] != "0");
     let times: Vec<f64> = arrivals.map(|s| s["t"].as_f64().unwrap()).collect();
-    let reply = ask(&model, r#"{"kind": "section", "section": {"surface": "v"}}"#);
+    let reply = ask(
+        &model,
+        r#"{"kind": "section", "section": {"surface": "v"}}"#,
+    );
     assert_eq!(reply.array("t"), times);
     let request = r#"{"kind": "section", "section": {"state": "y", "value": 0.5, "direction": 1}}"#;
     let reply = ask(&model, request);
@@ -43,13 +46,21 @@ fn a_diagram_has_the_returns_of_each_value() {
     let reply = ask(&model, &request);
     assert_eq!(reply.header["done"], 3);
     assert_eq!(reply.header["status"], serde_json::json!([1, 1, 1]));
-    assert_eq!(reply.array("index"), [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
-    assert_eq!(reply.array("value")[3..6], [0.4; 3]);
-    let request = format!(
-        r#"{{"kind": "section", {common}, "t_span": [0, 1000], "params": {{"F": 0.7}}}}"#
+    assert_eq!(
+        reply.array("index"),
+        [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
     );
+    assert_eq!(reply.array("value")[3..6], [0.4; 3]);
+    let request =
+        format!(r#"{{"kind": "section", {common}, "t_span": [0, 1000], "params": {{"F": 0.7}}}}"#);
     let alone = ask(&model, &request);
-    let alone: Vec<f64> = alone.array("y").iter().skip(1).step_by(2).copied().collect();
+    let alone: Vec<f64> = alone
+        .array("y")
+        .iter()
+        .skip(1)
+        .step_by(2)
+        .copied()
+        .collect();
     assert_eq!(reply.array("y")[6..], alone);
 }
 

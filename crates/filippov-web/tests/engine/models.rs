@@ -75,7 +75,8 @@ pub fn oscillator() -> Model {
     let rest = g.sub(drive, y);
     let field = vec![v, g.sub(rest, force)];
     let system = saved(g, field, names(&["y", "v"], &["F"]), &[0.4]);
-    let page = r#"{"title": "friction", "y0": [1, 2], "t_span": [0, 60], "rtol": 1e-9, "atol": 1e-9}"#;
+    let page =
+        r#"{"title": "friction", "y0": [1, 2], "t_span": [0, 60], "rtol": 1e-9, "atol": 1e-9}"#;
     Model::from_bytes(&pack(&system.to_bytes(), page).unwrap()).unwrap()
 }
 

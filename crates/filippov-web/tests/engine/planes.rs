@@ -24,7 +24,10 @@ fn sticking_ends_where_the_spring_is_as_strong_as_friction() {
     let (first, last) = (attracting[0][0], attracting[0][attracting[0].len() - 1]);
     let ends = [first[0].min(last[0]), first[0].max(last[0])];
     // The normal components are linear along the surface, so the tangencies are exact.
-    assert!((ends[0] + 0.5).abs() < 1e-12 && (ends[1] - 0.5).abs() < 1e-12, "{ends:?}");
+    assert!(
+        (ends[0] + 0.5).abs() < 1e-12 && (ends[1] - 0.5).abs() < 1e-12,
+        "{ends:?}"
+    );
     assert!(attracting[0].iter().all(|point| point[1].abs() < 1e-9));
     assert_eq!(parts(&reply, "crossing").len(), 2);
     // The whole sliding segment is at rest: no equilibrium is isolated.
@@ -32,7 +35,9 @@ fn sticking_ends_where_the_spring_is_as_strong_as_friction() {
     let field = reply.array("field");
     assert_eq!(field.len(), 4 * 400);
     for arrow in field.chunks_exact(4) {
-        let [y, v, dy, dv] = *arrow else { unreachable!() };
+        let [y, v, dy, dv] = *arrow else {
+            unreachable!()
+        };
         assert_eq!(dy, v);
         assert!((dv + y + 0.5 * v.signum()).abs() < 1e-12);
     }
@@ -59,11 +64,17 @@ fn equilibria_of_regions_are_admissible_or_virtual() {
     let request = r#"{"kind": "portrait", "box": [-2, 2, -1.5, 1], "cells": 16}"#;
     let reply = ask(&two_nodes(), request);
     let found = reply.header["equilibria"].as_array().unwrap();
-    let nodes: Vec<_> = found.iter().filter(|e| e["surfaces"] == serde_json::json!([])).collect();
+    let nodes: Vec<_> = found
+        .iter()
+        .filter(|e| e["surfaces"] == serde_json::json!([]))
+        .collect();
     assert_eq!(nodes.len(), 2, "{found:?}");
     for node in nodes {
         assert!((node["y"][0].as_f64().unwrap().abs() - 1.0).abs() < 1e-9);
-        assert_eq!((&node["stable"], &node["admissible"]), (&true.into(), &true.into()));
+        assert_eq!(
+            (&node["stable"], &node["admissible"]),
+            (&true.into(), &true.into())
+        );
     }
     // Between them x = 0 repels.
     assert_eq!(parts(&reply, "repelling").len(), 1);
@@ -74,7 +85,10 @@ fn equilibria_of_regions_are_admissible_or_virtual() {
 
 #[test]
 fn a_forced_field_has_no_equilibria_and_says_so() {
-    let reply = ask(&oscillator(), r#"{"kind": "portrait", "box": [-2, 2, -2, 2], "t": 1}"#);
+    let reply = ask(
+        &oscillator(),
+        r#"{"kind": "portrait", "box": [-2, 2, -2, 2], "t": 1}"#,
+    );
     assert_eq!(reply.header["equilibria"], serde_json::json!([]));
     assert!(reply.header["note"].as_str().unwrap().contains("time"));
 }

@@ -17,28 +17,64 @@ fn what_is_wrong_is_named() {
         ("{}", "kind: is missing"),
         (r#"{"kind": "dance"}"#, "describe, run"),
         (r#"{"kind": "run", "y0": [1]}"#, "y0: 2 numbers"),
-        (r#"{"kind": "run", "y0": [1, "2"]}"#, "y0: a list of finite numbers"),
+        (
+            r#"{"kind": "run", "y0": [1, "2"]}"#,
+            "y0: a list of finite numbers",
+        ),
         (r#"{"kind": "run", "t_span": [0]}"#, "t_span: 2 numbers"),
         (r#"{"kind": "run", "t_span": [1, 0]}"#, "t_span[1]"),
-        (r#"{"kind": "run", "params": {"G": 1}}"#, "params.G: no such parameter; there are F"),
+        (
+            r#"{"kind": "run", "params": {"G": 1}}"#,
+            "params.G: no such parameter; there are F",
+        ),
         (r#"{"kind": "run", "params": {"F": null}}"#, "params.F"),
         (r#"{"kind": "run", "params": [1]}"#, "params: an object"),
         (r#"{"kind": "run", "rtol": -1}"#, "rtol"),
-        (r#"{"kind": "run", "method": "RK45"}"#, "method: \"RK45\" is none of auto"),
-        (r#"{"kind": "run", "max_steps": 1.5}"#, "max_steps: a whole number"),
+        (
+            r#"{"kind": "run", "method": "RK45"}"#,
+            "method: \"RK45\" is none of auto",
+        ),
+        (
+            r#"{"kind": "run", "max_steps": 1.5}"#,
+            "max_steps: a whole number",
+        ),
         (r#"{"kind": "run", "tolerance": 0}"#, "tolerance"),
         (r#"{"kind": "sample"}"#, "times: is missing"),
-        (r#"{"kind": "sample", "times": [61]}"#, "times: 61 is outside"),
+        (
+            r#"{"kind": "sample", "times": [61]}"#,
+            "times: 61 is outside",
+        ),
         (r#"{"kind": "section"}"#, "section: is missing"),
-        (r#"{"kind": "section", "section": {}}"#, "section: give a surface"),
-        (r#"{"kind": "section", "section": {"surface": "w"}}"#, "section.surface: \"w\" is none of v"),
-        (r#"{"kind": "section", "section": {"surface": 1}}"#, "section.surface: 1 is none of v"),
-        (r#"{"kind": "section", "section": {"period": 0}}"#, "section.period: must be positive"),
-        (r#"{"kind": "diagram", "section": {"period": 1}}"#, "parameter: is missing"),
+        (
+            r#"{"kind": "section", "section": {}}"#,
+            "section: give a surface",
+        ),
+        (
+            r#"{"kind": "section", "section": {"surface": "w"}}"#,
+            "section.surface: \"w\" is none of v",
+        ),
+        (
+            r#"{"kind": "section", "section": {"surface": 1}}"#,
+            "section.surface: 1 is none of v",
+        ),
+        (
+            r#"{"kind": "section", "section": {"period": 0}}"#,
+            "section.period: must be positive",
+        ),
+        (
+            r#"{"kind": "diagram", "section": {"period": 1}}"#,
+            "parameter: is missing",
+        ),
         (r#"{"kind": "portrait"}"#, "box: is missing"),
         (r#"{"kind": "portrait", "box": [1, 0, 0, 1]}"#, "box: [x0"),
-        (r#"{"kind": "portrait", "box": [0, 1, 0, 1], "axes": [0, 0]}"#, "axes: two different"),
-        (r#"{"kind": "basins", "box": [0, 1, 0, 1], "targets": [[1]]}"#, "targets"),
+        (
+            r#"{"kind": "portrait", "box": [0, 1, 0, 1], "axes": [0, 0]}"#,
+            "axes: two different",
+        ),
+        (
+            r#"{"kind": "basins", "box": [0, 1, 0, 1], "targets": [[1]]}"#,
+            "targets",
+        ),
     ];
     for (request, part) in cases {
         let error = refused(request);

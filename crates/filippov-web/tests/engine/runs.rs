@@ -66,7 +66,8 @@ fn check_curve(model: &Model, reply: &Reply, span: &str, tolerance: f64) -> usiz
             }
         }
     }
-    let request = format!(r#"{{"kind": "sample", "t_span": {span}, "y0": [1, 2], "times": {times:?}}}"#);
+    let request =
+        format!(r#"{{"kind": "sample", "t_span": {span}, "y0": [1, 2], "times": {times:?}}}"#);
     let exact = ask(model, &request);
     assert_eq!(exact.array("t"), times);
     for ((k, share), exact) in at.into_iter().zip(exact.array("y").chunks_exact(n)) {
@@ -93,7 +94,10 @@ fn the_curve_is_within_the_tolerance() {
         counts.push(check_curve(&model, &reply, "[0, 60]", tolerance));
     }
     // The error of chords falls with the square of their lengths.
-    assert!(counts[1] > 2 * counts[0] && counts[2] > 2 * counts[1], "{counts:?}");
+    assert!(
+        counts[1] > 2 * counts[0] && counts[2] > 2 * counts[1],
+        "{counts:?}"
+    );
     assert!(counts[1] < 600, "{counts:?}");
 }
 
@@ -131,7 +135,10 @@ fn an_action_is_in_the_table_with_both_states() {
     );
     let switches = reply.header["switches"].as_array().unwrap();
     let first = &switches[0];
-    assert_eq!((&first["kind"], &first["note"]), (&"reset".into(), &"impact".into()));
+    assert_eq!(
+        (&first["kind"], &first["note"]),
+        (&"reset".into(), &"impact".into())
+    );
     let (before, after) = (&first["before"][1], &first["y"][1]);
     let ratio = after.as_f64().unwrap() / before.as_f64().unwrap();
     assert!((ratio + 0.6).abs() < 1e-12);
@@ -141,7 +148,10 @@ fn an_action_is_in_the_table_with_both_states() {
 #[test]
 fn a_run_that_is_cut_short_has_its_beginning() {
     let reply = ask(&oscillator(), r#"{"kind": "run", "max_steps": 5}"#);
-    assert_eq!((&reply.header["status"], &reply.header["reason"]), (&(-1).into(), &"max_steps".into()));
+    assert_eq!(
+        (&reply.header["status"], &reply.header["reason"]),
+        (&(-1).into(), &"max_steps".into())
+    );
     assert_eq!(reply.header["success"], false);
     let t = reply.array("t");
     assert!(t[t.len() - 1] < 60.0 && t[t.len() - 1] > 0.0);
