@@ -32,7 +32,7 @@ N ?= 6000
 SEED ?= 0
 
 .PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz decisions bench demo \
-	pictures docs check all clean
+	pictures app docs check all clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -107,6 +107,9 @@ demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 
 pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
+
+app: ## the interactive page, into python/filippov/app/static; skips by name what cannot be built here
+	@CARGO="$(CARGO)" sh scripts/build_app.sh
 
 docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet

@@ -119,8 +119,7 @@ impl Model {
         let (n, n_parameters) = (definition.field.len(), definition.n_parameters());
         let names = &definition.names;
         let states = match names.states.is_empty() {
-            true if n == 1 => vec!["x".into()],
-            true => (0..n).map(|i| format!("x{i}")).collect(),
+            true => (0..n).map(|i| format!("x[{i}]")).collect(),
             false => names.states.clone(),
         };
         let values = saved.valid_for.as_ref().unwrap_or(&saved.defaults);

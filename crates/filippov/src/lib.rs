@@ -90,6 +90,7 @@ mod mode;
 pub mod motion;
 mod options;
 mod patience;
+mod powers;
 mod record;
 mod saved;
 pub mod sparse;
