@@ -157,7 +157,8 @@ class Engine:
 
     def _found_cycle(self, given: Mapping[str, Any]) -> Cycle:
         period = None if given.get("period") is None else _number(given, "period", 0.0)
-        return limit_cycle(self.page.system, self._start(given), self._params(given), period=period)
+        t0 = _number(given, "t0", self._span(given)[0])
+        return limit_cycle(self.page.system, self._start(given), self._params(given), period=period, t0=t0)
 
     def _start(self, given: Mapping[str, Any]) -> list[float]:
         if given.get("y0") is None:
