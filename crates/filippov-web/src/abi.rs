@@ -95,13 +95,24 @@ pub extern "C" fn drop_model(handle: u32) {
 /// `len` bytes can be read at `ptr`.
 #[no_mangle]
 pub unsafe extern "C" fn ask(handle: u32, ptr: *const u8, len: usize) -> *mut u8 {
-    // SAFETY: the caller vouches for it.
-    let request = unsafe { std::slice::from_raw_parts(ptr, len) };
     MODELS.with_borrow(|models| {
         let place = (handle as usize).checked_sub(1);
         let model = place.and_then(|place| models.get(place)?.as_ref());
-        model.map_or(std::ptr::null_mut(), |model| block(&answer(model, request)))
+        let Some(model) = model else {
+            return std::ptr::null_mut();
+        };
+        // SAFETY: the caller vouches for it.
+        unsafe { answered(ptr, len, |request| answer(model, request)) }
     })
+}
+
+/// What a function makes of bytes of the page, as a block: for further functions of a module.
+///
+/// # Safety
+/// `len` bytes can be read at `ptr`.
+pub unsafe fn answered(ptr: *const u8, len: usize, make: impl FnOnce(&[u8]) -> Vec<u8>) -> *mut u8 {
+    // SAFETY: the caller vouches for it.
+    block(&make(unsafe { std::slice::from_raw_parts(ptr, len) }))
 }
 
 /// Frees a block.

@@ -32,7 +32,8 @@ const UNDECIDED: f64 = 1e-6;
 /// Differences of the cube root of the rounding unit: the best for central ones.
 const STEP: f64 = 6e-6;
 
-/// The equilibria in the window: those of the regions seen there, and those on one surface each.
+/// The equilibria in the window: those of the regions seen there, and those on one surface each. A point on the border of its
+/// region is not among them: it is the end of sliding, or of sticking.
 pub fn equilibria(
     plane: &Plane,
     parts: &[SheetPart],
@@ -71,6 +72,9 @@ pub fn equilibria(
             let Some((x, jacobian)) = balance.solve(x.clone())? else {
                 continue;
             };
+            if plane.is_on_surface(&x, signs, n_visible)? {
+                continue;
+            }
             let own = plane.signs(&x)?;
             let is_admissible = own[..n_visible] == signs[..n_visible];
             add(Equilibrium {

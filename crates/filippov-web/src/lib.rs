@@ -30,7 +30,7 @@
 //! ```
 
 #[cfg(target_arch = "wasm32")]
-mod abi;
+pub mod abi;
 mod answer;
 mod clusters;
 mod curve;

@@ -58,6 +58,8 @@ pub struct SheetPart {
 /// Column and row of a corner of a cell.
 type Corner = (usize, usize);
 
+/// A state nearer to a surface than this share of the window is on it.
+const ON_SURFACE: f64 = 1e-7;
 /// Steps of the search for a zero along an edge.
 const MOST_STEPS: usize = 40;
 
@@ -105,6 +107,25 @@ impl Plane<'_> {
         let setting = Setting::new(&signs, self.q);
         self.system.field(&setting.at(self.t, &x), &mut dx)?;
         Ok(self.window.point(&dx))
+    }
+
+    /// Is a state on one of the first `n` surfaces, to a small share of the window?
+    pub fn is_on_surface(&self, x: &[f64], signs: &[f64], n: usize) -> Result<bool, FieldError> {
+        let place = Setting::new(signs, self.q).at(self.t, x);
+        let mut h = vec![0.0; signs.len()];
+        self.system.surfaces(&place, &mut h)?;
+        let (mut gradient, mut active) = (vec![0.0; x.len()], vec![true; signs.len()]);
+        self.system.active(signs, &[], &mut active);
+        for j in (0..n).filter(|&j| active[j]) {
+            self.system.gradient(j, &place, &mut gradient)?;
+            let axes = self.window.axes.into_iter().enumerate();
+            let across = axes
+                .map(|(k, axis)| gradient[axis].abs() * (self.window.high[k] - self.window.low[k]));
+            if h[j].abs() <= ON_SURFACE * across.sum::<f64>() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The parts of the first `n` surfaces in the window.

@@ -80,7 +80,7 @@ pub fn oscillator() -> Model {
     Model::from_bytes(&pack(&system.to_bytes(), page).unwrap()).unwrap()
 }
 
-/// x' = v, v' = -|x|-like stiffness: (x, v)' = (v, -x - x sign(x) / 10), which crosses x = 0 twice in each turn.
+/// x' = v, v' = -x - |x| / 10, which crosses x = 0 twice in each turn.
 pub fn stiffening() -> Model {
     let mut g = Graph::new();
     let (x, v, tenth) = (g.state(0), g.state(1), g.constant(-0.1));
@@ -101,7 +101,7 @@ pub fn friction() -> Model {
     Model::from_bytes(&saved(g, field, names(&["y", "v"], &["F"]), &[0.5]).to_bytes()).unwrap()
 }
 
-/// x' = a - sign y, y' = b - x - y - sign(y): on y = 0 it slides, with a pseudo-equilibrium at lambda = a, x = b - a.
+/// x' = a - sign y, y' = b - x - y - 2 sign y: on y = 0 it slides, with a pseudo-equilibrium at lambda = a, x = b - 2 a.
 pub fn sliding() -> Model {
     let mut g = Graph::new();
     let (x, y, a, b) = (g.state(0), g.state(1), g.parameter(0), g.parameter(1));
