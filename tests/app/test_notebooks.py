@@ -120,9 +120,8 @@ def check_widget(page: Any, moved: Path, save: Callable[[Any, str], None]) -> No
     slider.wait_for()
     page.wait_for_function(COLOURS + " > 3")
     save(page, "before")
-    slider.focus()
     for _ in range(5):
-        page.keyboard.press("ArrowRight")
+        slider.press("ArrowRight")
     for _ in range(300):
         if moved.is_file() and moved.read_text():
             break
