@@ -2,7 +2,7 @@
 
 use filippov::action::Trigger;
 use filippov::{Definition, Rules, SavedAction, SavedSystem};
-use filippov_expr::{Graph, Names, NodeId};
+use filippov_expr::{Graph, Names, NodeId, UnaryOp};
 use filippov_web::{answer, pack, Model};
 use serde_json::Value;
 
@@ -69,7 +69,7 @@ pub fn oscillator() -> Model {
     let (t, y, v, friction) = (g.time(), g.state(0), g.state(1), g.parameter(0));
     let third = g.constant(3.0);
     let phase = g.div(t, third);
-    let drive = g.sin(phase);
+    let drive = g.unary(UnaryOp::Sin, phase);
     let sign = g.sign(v);
     let force = g.mul(friction, sign);
     let rest = g.sub(drive, y);
