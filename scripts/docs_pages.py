@@ -43,6 +43,8 @@ def on_files(files: Any, config: Any) -> Any:
     overview = "gallery/index.md"
     scripts = [job for job in jobs if job.suffix == ".py"]
     files.append(File.generated(config, overview, content=_overview(scripts)))
+    for name, content in _app_pages().items():
+        files.append(File.generated(config, name, content=content))
     _gallery_entries(config).insert(0, overview)
     _replace(config.nav, "decisions", _decisions(docs))
     _complete(config.nav, docs)
@@ -106,6 +108,16 @@ def _page(page: Path, docs: Path) -> dict[str, bytes]:
         _run([str(ROOT / "scripts" / "readme_blocks.py"), str(page), folder], page)
         beside = page.parent.relative_to(docs).as_posix()
         return {f"{beside}/{path.name}": path.read_bytes() for path in sorted(Path(folder).glob("*.png"))}
+
+
+def _app_pages() -> dict[str, bytes]:
+    """Return the interactive pages with their files; where the page was not built, one page that says so."""
+    maker = ROOT / "scripts" / "app_pages.py"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _run([str(maker), name], maker)
+        made = sorted(path for path in folder.rglob("*") if path.is_file())
+        return {f"app/{path.relative_to(folder).as_posix()}": path.read_bytes() for path in made}
 
 
 def _example(script: Path) -> dict[str, str | bytes]:

@@ -46,7 +46,7 @@ mod _core {
     #[pymodule_export]
     use super::itineraries::HeldMotions;
     #[pymodule_export]
-    use super::page::{answer_page, pack_page, PageModel};
+    use super::page::{answer_page, pack_page, page_of, PageModel};
     #[pymodule_export]
     use super::regions::Regions;
     #[pymodule_export]

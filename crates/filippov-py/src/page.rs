@@ -2,12 +2,12 @@
 
 use filippov::action::Actions;
 use filippov::PiecewiseSystem;
-use filippov_web::{answer, pack, Description, Model, Parameter, Ready, Refusal, Source};
+use filippov_web::{answer, pack, unpack, Description, Model, Parameter, Ready, Refusal, Source};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::prepared_run::PreparedRun;
+use crate::prepared_run::{ActionRow, PreparedRun};
 
 /// A model of the page: a system with its names, its default values and what the page shows first.
 #[pyclass(frozen, module = "filippov._core")]
@@ -21,19 +21,23 @@ impl PageModel {
         Model::from_bytes(data).map(PageModel).map_err(refused)
     }
 
-    /// A model whose system `make(params, t0, y0)` returns for every run; for functions that could not be traced.
+    /// A model whose system and actions `make(params, t0, y0)` returns for every run; for functions that are called.
     #[staticmethod]
-    #[pyo3(signature = (make, states, params, surfaces, page))]
+    #[pyo3(signature = (make, states, params, surfaces, page, actions=Vec::new(), discrete=Vec::new()))]
     fn of_calls(
         make: Py<PyAny>,
         states: Vec<String>,
         params: &Bound<'_, PyDict>,
         surfaces: Vec<String>,
         page: &str,
+        actions: Vec<String>,
+        discrete: Vec<String>,
     ) -> PyResult<Self> {
         let mut description = Description {
             states,
             surfaces,
+            actions,
+            discrete,
             ..Description::default()
         };
         description.set_page(page).map_err(refused)?;
@@ -67,6 +71,13 @@ pub fn pack_page<'py>(py: Python<'py>, system: &[u8], page: &str) -> PyResult<Bo
     Ok(PyBytes::new(py, &bytes))
 }
 
+/// The text of the section of the page in the bytes of a model; none in those of a system alone.
+#[pyfunction]
+pub fn page_of(data: &[u8]) -> PyResult<Option<String>> {
+    let (_, page) = unpack(data).map_err(crate::systems::refused)?;
+    Ok(page)
+}
+
 /// Systems that a function of Python makes.
 struct Calls {
     make: Py<PyAny>,
@@ -76,8 +87,9 @@ impl Source for Calls {
     fn ready(&self, params: &[f64], t: f64, x: &[f64]) -> Result<Box<dyn Ready + '_>, Refusal> {
         let prepared = Python::attach(|py| {
             let arguments = (params.to_vec(), t, x.to_vec());
-            let system = self.make.bind(py).call1(arguments)?;
-            PreparedRun::new(&system, t, x.to_vec(), params.to_vec(), &[], &[])
+            let made = self.make.bind(py).call1(arguments)?;
+            let (system, actions): (Bound<'_, PyAny>, Vec<ActionRow>) = made.extract()?;
+            PreparedRun::new(&system, t, x.to_vec(), params.to_vec(), &[], &actions)
         });
         match prepared {
             Ok(prepared) => Ok(Box::new(prepared)),

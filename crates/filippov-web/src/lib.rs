@@ -47,5 +47,5 @@ mod sheet;
 mod words;
 
 pub use answer::answer;
-pub use model::{pack, Description, Model, Parameter, Ready, Source};
+pub use model::{pack, unpack, Description, Model, Parameter, Ready, Source};
 pub use refusal::Refusal;

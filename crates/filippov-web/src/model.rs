@@ -113,7 +113,7 @@ impl Model {
     /// If the bytes are damaged, hold something else, or the system cannot be compiled.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
         let refused = |error: filippov::Error| Refusal::model(error.to_string());
-        let (saved, text) = SavedSystem::from_bytes_with(bytes, PAGE).map_err(refused)?;
+        let (saved, text) = unpack(bytes).map_err(refused)?;
         let page = text.as_deref().map_or(Ok(Map::new()), page_of)?;
         let definition = &saved.definition;
         let (n, n_parameters) = (definition.field.len(), definition.n_parameters());
@@ -185,8 +185,16 @@ impl Model {
 pub fn pack(system: &[u8], page: &str) -> Result<Vec<u8>, Refusal> {
     let refused = |error: filippov::Error| Refusal::model(error.to_string());
     page_of(page)?;
-    let (saved, _) = SavedSystem::from_bytes_with(system, PAGE).map_err(refused)?;
+    let (saved, _) = unpack(system).map_err(refused)?;
     Ok(saved.to_bytes_with(PAGE, page))
+}
+
+/// The system in the bytes of a model, and the text of the section of its page, if it has one.
+///
+/// # Errors
+/// As [`SavedSystem::from_bytes`].
+pub fn unpack(model: &[u8]) -> Result<(SavedSystem, Option<String>), filippov::Error> {
+    SavedSystem::from_bytes_with(model, PAGE)
 }
 
 fn page_of(text: &str) -> Result<Map<String, Value>, Refusal> {

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from filippov._core import __version__
 from filippov.cli import commands
+from filippov.cli.exploring import add_app_options, app
 from filippov.cli.following import add_continue_options, add_cycle_options, continue_, cycle
 from filippov.cli.solving import add_run_options
 from filippov.cli.sweeping import add_sweep_options, sweep
@@ -28,6 +29,7 @@ first steps:
   filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --store runs --plot diagram.png
   filippov cycle model.py --plot cycle.png
   filippov continue model.py --parameter omega --range 0.2 0.9 --plot branch.png
+  filippov app model.py                      sliders and pictures in the browser
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -74,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_sweep(subparsers)
     _add_cycle(subparsers)
     _add_continue(subparsers)
+    _add_app(subparsers)
     return parser
 
 
@@ -213,3 +216,26 @@ def _add_continue(subparsers: argparse._SubParsersAction[argparse.ArgumentParser
     )
     add_continue_options(command)
     command.set_defaults(run=continue_)
+
+
+_APP = """\
+examples:
+  filippov app                               a reference problem
+  filippov app model.py --param F=0:2        the slider of F goes from 0 to 2
+  filippov app dry_friction --t 0 120 --port 8123 --no-browser
+
+The page is served to this computer alone, at 127.0.0.1; the address that is printed has a token, without
+which nothing is answered. Ctrl-C ends it.
+"""
+
+
+def _add_app(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = _command_with_a_model(
+        subparsers,
+        "app",
+        help="explore a model in the browser, with sliders",
+        description="Serve the interactive page of a model to this computer, and open it in the browser.",
+        epilog=_APP,
+    )
+    add_app_options(command)
+    command.set_defaults(run=app)

@@ -37,9 +37,14 @@ def add_run_options(command: argparse.ArgumentParser) -> None:
     how.add_argument("--progress", action="store_true", help="show how far the run is")
 
 
-def add_model_options(command: argparse.ArgumentParser) -> None:
+def add_model_options(command: argparse.ArgumentParser, default: str | None = None) -> None:
     """Add the arguments that choose a model, its initial state and its parameters to a command."""
-    command.add_argument("model", metavar="MODEL", help="a Python file, or a problem of `filippov list`")
+    what = "a Python file, or a problem of `filippov list`"
+    if default is None:
+        command.add_argument("model", metavar="MODEL", help=what)
+    else:
+        what += f"; {default} by default"
+        command.add_argument("model", metavar="MODEL", nargs="?", default=default, help=what)
     command.add_argument("--system", metavar="NAME", help="which system of the file; or FILE.py:NAME")
     command.add_argument(
         "--y0", nargs="+", metavar="X", help="initial state: numbers, or NAME=NUMBER for some of them"
