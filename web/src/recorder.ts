@@ -1,0 +1,191 @@
+/** A pen that writes SVG, so that the picture in the file is made by the routine that drew it on the screen. */
+
+import type { Pen, Raster } from "./pen.ts";
+
+interface Ink {
+  strokeStyle: Pen["strokeStyle"];
+  fillStyle: Pen["fillStyle"];
+  lineWidth: number;
+  lineCap: CanvasLineCap;
+  lineJoin: CanvasLineJoin;
+  globalAlpha: number;
+  font: string;
+  textAlign: CanvasTextAlign;
+  textBaseline: CanvasTextBaseline;
+  dash: readonly number[];
+  clips: number;
+}
+
+const FULL_TURN = 2 * Math.PI;
+const ANCHORS: Partial<Record<CanvasTextAlign, string>> = { center: "middle", right: "end", end: "end" };
+
+export class SvgPen implements Pen {
+  private readonly ink: Ink = {
+    strokeStyle: "#000",
+    fillStyle: "#000",
+    lineWidth: 1,
+    lineCap: "butt",
+    lineJoin: "miter",
+    globalAlpha: 1,
+    font: "10px sans-serif",
+    textAlign: "start",
+    textBaseline: "alphabetic",
+    dash: [],
+    clips: 0,
+  };
+  private readonly kept: Ink[] = [];
+  private readonly body: string[] = [];
+  private readonly clipPaths: string[] = [];
+  private path: string[] = [];
+
+  /** `embed` gives the address of a raster, `data:image/png;base64,..`. */
+  constructor(
+    private readonly width: number,
+    private readonly height: number,
+    private readonly embed: (raster: Raster) => string,
+  ) {}
+
+  get strokeStyle() { return this.ink.strokeStyle; }
+  set strokeStyle(value) { this.ink.strokeStyle = value; }
+  get fillStyle() { return this.ink.fillStyle; }
+  set fillStyle(value) { this.ink.fillStyle = value; }
+  get lineWidth() { return this.ink.lineWidth; }
+  set lineWidth(value) { this.ink.lineWidth = value; }
+  get lineCap() { return this.ink.lineCap; }
+  set lineCap(value) { this.ink.lineCap = value; }
+  get lineJoin() { return this.ink.lineJoin; }
+  set lineJoin(value) { this.ink.lineJoin = value; }
+  get globalAlpha() { return this.ink.globalAlpha; }
+  set globalAlpha(value) { this.ink.globalAlpha = value; }
+  get font() { return this.ink.font; }
+  set font(value) { this.ink.font = value; }
+  get textAlign() { return this.ink.textAlign; }
+  set textAlign(value) { this.ink.textAlign = value; }
+  get textBaseline() { return this.ink.textBaseline; }
+  set textBaseline(value) { this.ink.textBaseline = value; }
+
+  save(): void {
+    this.kept.push({ ...this.ink });
+  }
+
+  restore(): void {
+    const before = this.kept.pop();
+    if (!before) return;
+    this.body.push("</g>".repeat(this.ink.clips - before.clips));
+    Object.assign(this.ink, before);
+  }
+
+  beginPath(): void {
+    this.path = [];
+  }
+
+  closePath(): void {
+    this.path.push("Z");
+  }
+
+  moveTo(x: number, y: number): void {
+    this.path.push(`M${short(x)} ${short(y)}`);
+  }
+
+  lineTo(x: number, y: number): void {
+    this.path.push(`${this.path.length === 0 ? "M" : "L"}${short(x)} ${short(y)}`);
+  }
+
+  arc(x: number, y: number, radius: number, from: number, to: number): void {
+    const at = (angle: number) => `${short(x + radius * Math.cos(angle))} ${short(y + radius * Math.sin(angle))}`;
+    const turn = Math.min(to - from, FULL_TURN);
+    const bend = `A${short(radius)} ${short(radius)} 0 0 1 `;
+    this.path.push(`${this.path.length === 0 ? "M" : "L"}${at(from)}`);
+    // halves, for one arc of SVG cannot go all the way round
+    this.path.push(bend + at(from + turn / 2), bend + at(from + turn));
+  }
+
+  rect(x: number, y: number, width: number, height: number): void {
+    this.path.push(`M${short(x)} ${short(y)}h${short(width)}v${short(height)}h${short(-width)}Z`);
+  }
+
+  clip(): void {
+    this.clipPaths.push(this.path.join(""));
+    this.body.push(`<g clip-path="url(#clip${this.clipPaths.length})">`);
+    this.ink.clips += 1;
+  }
+
+  stroke(): void {
+    const { strokeStyle, lineWidth, lineCap, lineJoin, dash } = this.ink;
+    const extra = [
+      lineCap === "butt" ? "" : ` stroke-linecap="${lineCap}"`,
+      lineJoin === "miter" ? "" : ` stroke-linejoin="${lineJoin}"`,
+      dash.length ? ` stroke-dasharray="${dash.map(short).join(" ")}"` : "",
+    ].join("");
+    this.add(`<path d="${this.path.join("")}" fill="none" stroke="${strokeStyle}" stroke-width="${short(lineWidth)}"${extra}`, "/>");
+  }
+
+  fill(): void {
+    this.add(`<path d="${this.path.join("")}" fill="${this.ink.fillStyle}"`, "/>");
+  }
+
+  fillRect(x: number, y: number, width: number, height: number): void {
+    this.add(
+      `<rect x="${short(x)}" y="${short(y)}" width="${short(width)}" height="${short(height)}" fill="${this.ink.fillStyle}"`,
+      "/>",
+    );
+  }
+
+  fillText(text: string, x: number, y: number): void {
+    const { style, size, family } = readFont(this.ink.font);
+    const down = { middle: 0.35, top: 0.8, hanging: 0.8 }[this.ink.textBaseline as string] ?? 0;
+    const anchor = ANCHORS[this.ink.textAlign];
+    this.add(
+      `<text x="${short(x)}" y="${short(y + down * size)}" font-size="${size}" font-family="${escape(family)}"` +
+        (style ? ` font-style="${style}"` : "") +
+        (anchor ? ` text-anchor="${anchor}"` : "") +
+        ` fill="${this.ink.fillStyle}" xml:space="preserve"`,
+      `>${escape(text)}</text>`,
+    );
+  }
+
+  /** About the width of the text: no letters are laid out here. */
+  measureText(text: string): { readonly width: number } {
+    return { width: 0.56 * readFont(this.ink.font).size * text.length };
+  }
+
+  setLineDash(pattern: number[]): void {
+    this.ink.dash = pattern;
+  }
+
+  raster(raster: Raster, x: number, y: number, width: number, height: number): void {
+    this.add(
+      `<image x="${short(x)}" y="${short(y)}" width="${short(width)}" height="${short(height)}" ` +
+        `preserveAspectRatio="none" style="image-rendering:pixelated" href="${this.embed(raster)}"`,
+      "/>",
+    );
+  }
+
+  /** The file. */
+  toString(): string {
+    const clips = this.clipPaths.map((d, i) => `<clipPath id="clip${i + 1}"><path d="${d}"/></clipPath>`).join("");
+    const open = this.ink.clips > 0 ? "</g>".repeat(this.ink.clips) : "";
+    return (
+      `<svg xmlns="http://www.w3.org/2000/svg" width="${this.width}" height="${this.height}" ` +
+      `viewBox="0 0 ${this.width} ${this.height}"><defs>${clips}</defs>\n${this.body.join("\n")}${open}\n</svg>\n`
+    );
+  }
+
+  private add(start: string, end: string): void {
+    const alpha = this.ink.globalAlpha < 1 ? ` opacity="${short(this.ink.globalAlpha)}"` : "";
+    this.body.push(start + alpha + end);
+  }
+}
+
+function short(value: number): string {
+  return String(Math.round(value * 100) / 100);
+}
+
+function readFont(font: string): { style: string; size: number; family: string } {
+  const [, style, size, family] = /^(italic )?([\d.]+)px (.+)$/.exec(font) ?? [];
+  return { style: style?.trim() ?? "", size: Number(size ?? 10), family: family ?? "sans-serif" };
+}
+
+function escape(text: string): string {
+  return text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll('"', "&quot;");
+}

@@ -1,0 +1,145 @@
+/** The replies of the engine as the front uses them. Names are those of the requests. */
+
+import { EngineError, type Reply } from "./wire.ts";
+
+/** A part of the motion with one mode: rows `first` to `last`, both included, of the curve. */
+export interface Piece {
+  readonly mode: string;
+  readonly first: number;
+  readonly last: number;
+  readonly kind: string;
+}
+
+export interface Switch {
+  readonly t: number;
+  readonly kind: string;
+  readonly surfaces: readonly string[];
+  readonly from: string;
+  readonly to: string;
+  readonly y: readonly number[];
+  readonly note?: string;
+  readonly kink?: boolean;
+}
+
+export interface Notice {
+  readonly t?: number;
+  readonly code?: string;
+  readonly message: string;
+}
+
+/** A run, as a curve in pieces. `y` holds rows of `n` states. */
+export interface Run {
+  readonly n: number;
+  readonly t: Float64Array;
+  readonly y: Float64Array;
+  readonly pieces: readonly Piece[];
+  readonly switches: readonly Switch[];
+  readonly status: string;
+  readonly message: string;
+  readonly success: boolean;
+  readonly warnings: readonly Notice[];
+  readonly steps: number;
+  readonly evaluations: number;
+}
+
+export type SurfaceKind = "crossing" | "attracting" | "repelling" | "unknown";
+
+export interface SurfacePart {
+  readonly surface: string;
+  readonly kind: SurfaceKind;
+  readonly first: number;
+  readonly last: number;
+}
+
+export interface Equilibrium {
+  readonly y: readonly number[];
+  readonly surfaces: readonly string[];
+  readonly stable: boolean | null;
+  readonly admissible: boolean;
+}
+
+/** The plane of two states: surfaces in parts, arrows `x, y, dx, dy`, equilibria. */
+export interface Plane {
+  readonly parts: readonly SurfacePart[];
+  readonly points: Float64Array;
+  readonly field: Float64Array;
+  readonly equilibria: readonly Equilibrium[];
+  /** Why there are no equilibria, if that has a reason. */
+  readonly note: string;
+}
+
+/** Returns to a section: `y` holds rows of `n` states. */
+export interface Returns {
+  readonly n: number;
+  readonly t: Float64Array;
+  readonly y: Float64Array;
+  readonly message: string;
+}
+
+/** Points of a diagram, the state at their end, and what went wrong at which values. */
+export interface DiagramPart {
+  readonly value: Float64Array;
+  readonly y: Float64Array;
+  readonly end: readonly number[] | null;
+  readonly failures: readonly { readonly value: number; readonly message: string }[];
+}
+
+export interface Basins {
+  readonly rows: number;
+  readonly columns: number;
+  readonly label: Float64Array;
+  readonly labels: readonly string[];
+}
+
+export function toRun(reply: Reply): Run {
+  const header = reply.header;
+  const y = reply.table("y");
+  return {
+    n: y.shape[1] ?? 1,
+    t: reply.table("t").data,
+    y: y.data,
+    pieces: (header.pieces ?? []) as Piece[],
+    switches: (header.switches ?? []) as Switch[],
+    status: String(header.status ?? ""),
+    message: String(header.message ?? ""),
+    success: header.success !== false,
+    warnings: ((header.warnings ?? []) as (Notice | string)[]).map(toNotice),
+    steps: Number(header.steps ?? 0),
+    evaluations: Number(header.nfev ?? 0),
+  };
+}
+
+export function toPlane(reply: Reply): Plane {
+  const header = reply.header;
+  return {
+    parts: (header.parts ?? []) as SurfacePart[],
+    points: reply.table("points").data,
+    field: reply.table("field").data,
+    equilibria: (header.equilibria ?? []) as Equilibrium[],
+    note: String(header.note ?? ""),
+  };
+}
+
+export function toReturns(reply: Reply): Returns {
+  const y = reply.table("y");
+  return { n: y.shape[1] ?? 1, t: reply.table("t").data, y: y.data, message: String(reply.header.message ?? "") };
+}
+
+export function toDiagramPart(reply: Reply): DiagramPart {
+  return {
+    value: reply.table("value").data,
+    y: reply.table("y").data,
+    end: reply.has("end") ? [...reply.table("end").data] : null,
+    failures: (reply.header.messages ?? []) as DiagramPart["failures"],
+  };
+}
+
+export function toBasins(reply: Reply): Basins {
+  const { data, shape } = reply.table("label");
+  if (shape.length !== 2) throw new EngineError("the labels of the basins are no table", "reply");
+  return { rows: shape[0], columns: shape[1], label: data, labels: (reply.header.labels ?? []) as string[] };
+}
+
+function toNotice(given: Notice | string): Notice {
+  return typeof given === "string" ? { message: given } : given;
+}

@@ -1,0 +1,69 @@
+/** The choice of a section: the returns to a surface, or the ticks of a period. */
+
+import { make, select } from "./dom.ts";
+import { labelled, numberField } from "./controls.ts";
+import { frequencyOf, type Description, type Section, type State } from "./model.ts";
+
+/** The fields of a section; `changed` is called after each change. */
+export function sectionFields(model: Description, state: State, changed: () => void): HTMLElement {
+  const element = make("span", { class: "fields" });
+  const build = () => {
+    const options = optionsOf(model);
+    const chosen = state.section;
+    const pick = select("where to look at the motion", options.map(({ key, label }) => [key, label] as const), keyOf(chosen), (key) => {
+      state.section = options.find((option) => option.key === key)?.section ?? null;
+      build();
+      changed();
+    });
+    const parts: HTMLElement[] = [labelled("at", pick)];
+    if (chosen?.by === "period") {
+      const { phase } = chosen;
+      const take = (period: number) => ((state.section = { by: "period", period, phase }), changed());
+      parts.push(numberField("period", chosen.period, take, (value) => value > 0));
+    }
+    if (chosen !== null && chosen.by !== "surface") {
+      parts.push(numberField("phase", chosen.phase, (phase) => ((state.section = { ...chosen, phase }), changed())));
+    }
+    element.replaceChildren(...parts);
+  };
+  build();
+  return element;
+}
+
+interface Option {
+  readonly key: string;
+  readonly label: string;
+  readonly section: Section;
+}
+
+function optionsOf(model: Description): Option[] {
+  const options: Option[] = model.surfaces.map((surface) => ({
+    key: `surface ${surface}`,
+    label: `the surface ${surface} = 0`,
+    section: { by: "surface", surface },
+  }));
+  const frequency = frequencyOf(model);
+  if (frequency !== null) {
+    options.push({ key: "forcing", label: `each period 2π/${frequency}`, section: { by: "forcing", frequency, phase: 0 } });
+  }
+  options.push({ key: "period", label: "each period of …", section: { by: "period", period: 2 * Math.PI, phase: 0 } });
+  return options;
+}
+
+function keyOf(section: Section | null): string {
+  return section?.by === "surface" ? `surface ${section.surface}` : (section?.by ?? "");
+}
+
+/** The section in words: `at the surface v`. */
+export function showSection(section: Section | null): string {
+  switch (section?.by) {
+    case "surface":
+      return `at ${section.surface} = 0`;
+    case "forcing":
+      return `each 2π/${section.frequency}`;
+    case "period":
+      return "each period";
+    default:
+      return "";
+  }
+}
