@@ -43,7 +43,7 @@ export interface Counts {
   readonly most: number;
 }
 
-const BLOCK_BELOW = 30_000; // so few points are drawn as blocks of 2 x 2 pixels
+const SPARSE = 0.02; // of the pixels: points that are so few are drawn as blocks of 2 x 2
 
 /** Count the points in each pixel of the frame, `resolution` pixels for one of the page's. */
 export function countPoints(points: Points, frame: Frame, resolution: number): Counts {
@@ -56,21 +56,33 @@ export function countPoints(points: Points, frame: Frame, resolution: number): C
   const slopeX = width / (frame.x.values[1] - frame.x.values[0]);
   const slopeY = height / (frame.y.values[1] - frame.y.values[0]);
   const [fromX, toY] = [frame.x.values[0], frame.y.values[1]];
-  const block = Math.ceil(resolution) * (points.length < BLOCK_BELOW ? 2 : 1);
+  let [most, occupied] = [0, 0];
   for (let k = 0; k < x.length; k++) {
     const column = Math.floor((x[k] - fromX) * slopeX);
     const row = Math.floor((toY - y[k]) * slopeY);
     if (!(column >= 0 && column < width && row >= 0 && row < height)) continue;
-    if (block === 1) {
-      cells[row * width + column]++;
-      continue;
-    }
-    const [lastRow, lastColumn] = [Math.min(row + block, height), Math.min(column + block, width)];
-    for (let r = row; r < lastRow; r++) for (let c = column; c < lastColumn; c++) cells[r * width + c]++;
+    const n = ++cells[row * width + column];
+    if (n === 1) occupied++;
+    if (n > most) most = n;
   }
-  let most = 0;
-  for (const cell of cells) if (cell > most) most = cell;
-  return { width, height, cells, most };
+  const counts = { width, height, cells, most };
+  return occupied < SPARSE * cells.length ? widened(counts, Math.ceil(resolution)) : counts;
+}
+
+/** Each point a block of pixels, so that few points can be seen. */
+function widened({ width, height, cells, most }: Counts, by: number): Counts {
+  const wide = new Uint32Array(cells.length);
+  for (let row = 0; row < height; row++) {
+    for (let column = 0; column < width; column++) {
+      const n = cells[row * width + column];
+      if (n === 0) continue;
+      const [lastRow, lastColumn] = [Math.min(row + by, height - 1), Math.min(column + by, width - 1)];
+      for (let r = row; r <= lastRow; r++) {
+        for (let c = column; c <= lastColumn; c++) wide[r * width + c] = Math.max(wide[r * width + c], n);
+      }
+    }
+  }
+  return { width, height, cells: wide, most };
 }
 
 const FAINTEST = 0.45;
