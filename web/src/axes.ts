@@ -106,7 +106,7 @@ export interface AxesOptions {
 }
 
 const TICK_SIZE = 11.5;
-const PIXELS_PER_TICK = { x: 90, y: 48 };
+const PIXELS_PER_TICK = { x: 90, y: 44 };
 
 /** Draw the two axes with their ticks; names of quantities stand at their ends, upright. */
 export function drawAxes(pen: Pen, frame: Frame, options: AxesOptions, theme: Theme): void {
@@ -117,7 +117,7 @@ export function drawAxes(pen: Pen, frame: Frame, options: AxesOptions, theme: Th
   pen.lineWidth = 1;
   pen.setLineDash([]);
   const across = ticksOf(frame.x.values, (right - left) / PIXELS_PER_TICK.x);
-  const up = ticksOf(frame.y.values, Math.max(2, (bottom - top) / PIXELS_PER_TICK.y));
+  const up = ticksOf(frame.y.values, Math.max(3, (bottom - top) / PIXELS_PER_TICK.y));
   pen.beginPath();
   for (const value of up.values) {
     const y = crisp(frame.y.at(value));

@@ -9,8 +9,8 @@ import { button, make, select } from "./dom.ts";
 import type { Request } from "./engine.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
-import { motionRequest, rangeOf, sweptSection } from "./model.ts";
-import { count, showNumber } from "./numbers.ts";
+import { longSpan, motionRequest, rangeOf, sweptSection } from "./model.ts";
+import { count, showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { askAll } from "./pool.ts";
@@ -61,12 +61,12 @@ export class DiagramPanel implements Panel {
       });
     this.low = bound(0);
     this.high = bound(1);
-    const parameter = select("parameter", model.params.map(({ name }) => [name, name] as const), state.parameter ?? "", (name) => {
+    const parameter = select("parameter", model.params.map(({ name }) => [name, showName(name)] as const), state.parameter ?? "", (name) => {
       state.parameter = name;
       this.earlier.length = 0;
       this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
     });
-    const coordinate = select("state", model.states.map((name, i) => [String(i), name] as const), String(state.coordinate), (value) => {
+    const coordinate = select("state", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.coordinate), (value) => {
       state.coordinate = Number(value);
       this.up = null;
       changed();
@@ -196,6 +196,7 @@ export class DiagramPanel implements Panel {
       kind: "diagram",
       ...motionRequest(state),
       y0,
+      t_span: longSpan(state),
       section: sweptSection(state.section!, state.params, state.parameter!, values),
       skip: state.skip,
       count: state.count,

@@ -44,7 +44,7 @@ export function showSwitches(target: HTMLElement, run: Run, states: readonly str
     row.insertCell().textContent = words(entry.kind) + (entry.note ? `, ${entry.note}` : "");
     const surface = row.insertCell();
     surface.className = "name";
-    surface.textContent = entry.surfaces.join(", ");
+    surface.textContent = entry.surfaces.map(showName).join(", ");
     row.insertCell().textContent = entry.from === entry.to ? showMode(entry.to) : `${showMode(entry.from)} → ${showMode(entry.to)}`;
     entry.y.forEach((value, i) => {
       const cell = row.insertCell();

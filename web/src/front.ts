@@ -9,7 +9,7 @@ import { showSwitches } from "./events.ts";
 import { curveCsv, save, switchesCsv, writePng, writeSvg } from "./export.ts";
 import { initialState, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
 import { Motion } from "./motion.ts";
-import { count, showNumber } from "./numbers.ts";
+import { count, showName, showNumber } from "./numbers.ts";
 import type { Context, Panel } from "./panel.ts";
 import type { Engines } from "./pool.ts";
 import type { Run } from "./replies.ts";
@@ -55,6 +55,8 @@ export class Front {
   private readonly status = make("p", { class: "status", role: "status" });
   private readonly planeWords = make("p", { class: "quiet", role: "status" });
   private readonly reading = make("p", { class: "reading", "aria-hidden": "true" });
+  private readonly hint = make("p", { class: "quiet" }, "Click in the portrait to start elsewhere.");
+  private axisFields: HTMLSelectElement[] = [];
   private readonly stopButton = button("Stop", () => this.motion.stop());
   private readonly notice = make("p", { class: "notice", role: "status" });
   private readonly tabs = new Map<Place, { tab: HTMLButtonElement; body: HTMLElement }>();
@@ -72,8 +74,12 @@ export class Front {
     this.motion = new Motion(model, state, engines.quick, {
       theme: () => this.theme,
       ran: (run, words) => this.ran(run, words),
+      axesChosen: (axes) => this.axisFields.forEach((field, k) => (field.value = String(axes[k]))),
       planed: (words) => (this.planeWords.textContent = words === null ? "" : `The surfaces are missing: ${words}`),
-      started: () => this.showValues(),
+      started: () => {
+        this.hint.hidden = true;
+        this.showValues();
+      },
       read: (words) => (this.reading.textContent = words),
       busy: (isBusy) => {
         this.stopButton.hidden = !isBusy;
@@ -163,7 +169,7 @@ export class Front {
       { class: motion.portrait ? "pictures" : "pictures single" },
       motion.portrait ? this.buildPortrait() : null,
       this.buildSeries(),
-      make("div", { class: "line" }, this.status, this.stopButton, this.planeWords),
+      make("div", { class: "line" }, this.status, this.stopButton, motion.portrait ? this.hint : null, this.planeWords),
     );
     root.replaceChildren(
       this.buildHeader(),
@@ -173,16 +179,14 @@ export class Front {
 
   private buildHeader(): HTMLElement {
     const { model, host } = this;
-    const title = model.page.title || "a model of your own";
-    const name =
-      host.openProblem && host.problems.length > 1
-        ? select(
-            "model",
-            host.problems.map((problem) => [problem.name, problem.title] as const),
-            host.problem ?? "",
-            (chosen) => host.openProblem!(chosen),
-          )
-        : make("span", { class: "title" }, title);
+    const { title } = model.page;
+    const known = host.problems.map((problem) => [problem.name, problem.title] as const);
+    const isKnown = host.problem !== null && known.some(([name]) => name === host.problem);
+    const own = isKnown ? [] : ([["", host.problem ?? "this model"]] as const);
+    const choice =
+      host.openProblem && known.length > 1
+        ? select("model", [...own, ...known], isKnown ? host.problem! : "", (chosen) => host.openProblem!(chosen))
+        : null;
     const share = host.address === null ? null : button("Copy link", () => void this.share(), "a link that holds the model and this view");
     const theme = button("", () => this.toggleTheme());
     theme.className = "theme";
@@ -190,7 +194,8 @@ export class Front {
       "header",
       {},
       make("h1", {}, "filippov"),
-      name,
+      choice,
+      make("p", { class: "title" }, title || (choice ? "" : "a model of your own")),
       this.notice,
       make("nav", { "aria-label": "share and save" }, share, this.buildMenu(), theme),
     );
@@ -307,19 +312,18 @@ export class Front {
   private buildPortrait(): HTMLElement {
     const { model, motion, state } = this;
     const axis = (k: 0 | 1) =>
-      select(k === 0 ? "state across" : "state upwards", model.states.map((name, i) => [String(i), name] as const), String(state.axes![k]), (value) => {
+      select(k === 0 ? "state across" : "state upwards", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.axes![k]), (value) => {
         const axes: [number, number] = [...state.axes!];
         axes[k] = Number(value);
         if (axes[0] === axes[1]) axes[1 - k] = state.axes![k];
-        first.value = String(axes[0]);
-        second.value = String(axes[1]);
+        this.axisFields.forEach((field, i) => (field.value = String(axes[i])));
         motion.setAxes(axes);
       });
-    const [first, second] = [axis(0), axis(1)];
+    this.axisFields = [axis(0), axis(1)];
     const tools = make(
       "div",
       { class: "tools" },
-      ...(model.n > 2 ? [first, make("span", { class: "quiet" }, "and"), second] : []),
+      ...(model.n > 2 ? [this.axisFields[0], make("span", { class: "quiet" }, "and"), this.axisFields[1]] : []),
       button("Keep", () => motion.keep(), "keep this trajectory in the portrait (k)"),
       button("Clear", () => motion.clear(), "take the kept trajectories away"),
       button("−", () => motion.zoom(1.25), "smaller (−)"),
@@ -336,7 +340,7 @@ export class Front {
       const boxes = model.states.map((name, i) => {
         const box = make("input", { type: "checkbox", checked: motion.panels.includes(i) });
         box.addEventListener("change", () => motion.setShown(boxes.flatMap(({ box: one }, k) => (one.checked ? [k] : []))));
-        return { box, element: make("label", { class: "check" }, box, name) };
+        return { box, element: make("label", { class: "check" }, box, showName(name)) };
       });
       tools.append(make("details", { class: "menu" }, make("summary", {}, "States"), make("div", { class: "list" }, ...boxes.map(({ element }) => element))));
     }

@@ -7,7 +7,7 @@ import { makeTextReader, type TextReader } from "./editor.ts";
 import { Front, type Host } from "./front.ts";
 import { describe, type Description, type State } from "./model.ts";
 import { makeEngines, single, type Engines } from "./pool.ts";
-import { readFragment, toState } from "./share.ts";
+import { fromBase64, readFragment, toState } from "./share.ts";
 import { applyTheme, DARK, LIGHT } from "./theme.ts";
 import { EngineError } from "./wire.ts";
 
@@ -45,10 +45,11 @@ interface Problem {
 
 /** Start on a page: what to show is in the fragment, in the page, or with the local server. */
 export async function boot(element: HTMLElement): Promise<void> {
+  const home = location.hash; // of the model that the page was opened with
   let front: Front | null = null;
   const open = async () => {
     try {
-      const made = await fromAddress(element, (again) => void again().catch((error) => complain(element, error)));
+      const made = await fromAddress(element, home, (again) => void again().catch((error) => complain(element, error)));
       front?.close();
       front = made();
       Object.assign(element, { front });
@@ -65,7 +66,7 @@ export async function boot(element: HTMLElement): Promise<void> {
 type Open = (again: () => Promise<void>) => void;
 
 /** All that is needed for a front; it is put into the element by the function returned, when all has come. */
-async function fromAddress(element: HTMLElement, run: Open): Promise<() => Front> {
+async function fromAddress(element: HTMLElement, home: string, run: Open): Promise<() => Front> {
   const fragment = await readFragment(location.hash);
   const problems = await fetchProblems();
   const goTo = (hash: string) => {
@@ -74,7 +75,7 @@ async function fromAddress(element: HTMLElement, run: Open): Promise<() => Front
   const common = {
     problems,
     address: location.href.split("#")[0],
-    openProblem: (name: string) => goTo(`p=${encodeURIComponent(name)}`),
+    openProblem: (name: string) => goTo(name === "" ? home : `p=${encodeURIComponent(name)}`),
     reader: fetchReader,
   };
   const show = async (bytes: Uint8Array, problem: string | null): Promise<() => Front> => {
@@ -106,7 +107,7 @@ async function fromServer(
 ): Promise<() => Front> {
   const response = await fetch("model", { headers: { "X-Filippov-Token": token } });
   if (response.status !== 200 && response.status !== 204) {
-    throw new Error(`The local server gives no model (${response.status}). Open the address that \`filippov app\` printed.`);
+    throw new Error((await response.text()) || `The local server gives no model (${response.status}).`);
   }
   const bytes = response.status === 204 ? null : new Uint8Array(await response.arrayBuffer());
   if (bytes !== null && bytes.length > 0) {
@@ -147,7 +148,11 @@ async function fetchReader(): Promise<TextReader | null> {
   return bytes === null ? null : await makeTextReader(bytes);
 }
 
+/** A file beside the page; `null` if there is none. A page opened from a folder brings its files inside of scripts. */
 async function fetchBytes(name: string): Promise<Uint8Array | null> {
+  const embedded = (globalThis as { filippovFiles?: Readonly<Record<string, string>> }).filippovFiles?.[name];
+  if (embedded !== undefined) return fromBase64(embedded);
+  if (location.protocol === "file:") return null;
   const response = await fetch(name).catch(() => null);
   return response?.ok ? new Uint8Array(await response.arrayBuffer()) : null;
 }

@@ -154,6 +154,14 @@ export function motionRequest(state: State): Record<string, unknown> {
   return { params, y0, t_span, rtol, atol, method };
 }
 
+/** Time enough for all returns: each may take the time that is on the screen, or its period. */
+export function longSpan({ t_span, section, params, skip, count }: State): [number, number] {
+  const [from, to] = t_span;
+  const request = section === null ? {} : sectionRequest(section, params);
+  const each = Math.max(Math.abs(to - from), typeof request.period === "number" ? request.period : 0);
+  return [from, from + Math.sign(to - from) * each * (skip + count + 2)];
+}
+
 /** The section as the engine asks for it, with these parameters. */
 export function sectionRequest(section: Section, params: Readonly<Record<string, number>>): Record<string, unknown> {
   switch (section.by) {

@@ -1,5 +1,7 @@
 /** Modes as sign vectors, `+0-`: their order, their names, and their colours, which are the same in every run. */
 
+import { showName } from "./numbers.ts";
+
 /** Rows of Pascal's triangle modulo `modulus`. */
 function binomials(n: number, modulus: number): number[][] {
   const rows: number[][] = [];
@@ -69,7 +71,7 @@ export function explainMode(mode: string, surfaces: readonly string[]): string {
     return isSliding(mode) ? `${showMode(mode)}  sliding` : showMode(mode);
   }
   const sign = { "+": ">", "-": "<", "0": "=" }[mode];
-  return `${showMode(mode)}  ${surfaces[0]} ${sign} 0${mode === "0" ? ", sliding" : ""}`;
+  return `${showMode(mode)}  ${showName(surfaces[0])} ${sign} 0${mode === "0" ? ", sliding" : ""}`;
 }
 
 function countZeros(mode: string): number {

@@ -1,12 +1,12 @@
 /** The motion on the screen: one run, its phase portrait and its time series, and what a pointer does to them. */
 
 import type { Frame, Interval } from "./axes.ts";
-import { stateAt } from "./curves.ts";
+import { boundsOf, stateAt } from "./curves.ts";
 import type { Engine } from "./engine.ts";
 import { Latest } from "./latest.ts";
 import { motionRequest, type Description, type State } from "./model.ts";
 import { showMode } from "./modes.ts";
-import { showNumber } from "./numbers.ts";
+import { showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { boxOf, describePortrait, drawPortrait, fits, type Box, type PortraitData } from "./portrait.ts";
@@ -23,6 +23,8 @@ export interface MotionHooks {
   planed(words: string | null): void;
   /** A pointer or a key has chosen another start. */
   started(): void;
+  /** Other states stand on the axes of the portrait. */
+  axesChosen(axes: readonly [number, number]): void;
   /** What stands at the pointer, in words; empty for nothing. */
   read(words: string): void;
   /** A computation takes long, or it has ended. */
@@ -140,7 +142,7 @@ export class Motion {
     const at = t !== null && this.run ? stateAt(this.run, t) : null;
     if (at === null) this.hooks.read("");
     else {
-      const values = at.y.map((value, i) => `${this.model.states[i]} = ${showNumber(value, 5)}`).slice(0, MOST_PANELS);
+      const values = at.y.map((value, i) => `${showName(this.model.states[i])} = ${showNumber(value, 5)}`).slice(0, MOST_PANELS);
       this.hooks.read([`t = ${showNumber(t!, 5)}`, ...values, `mode ${showMode(at.mode)}`].join("    "));
     }
     this.redraw();
@@ -217,7 +219,18 @@ export class Motion {
     this.portrait?.redraw();
   }
 
+  /** A plane on which nothing moves shows nothing: the first two states that move take its place. */
+  private chooseAxes(run: Run): void {
+    const { axes } = this.state;
+    if (axes === null || this.model.page.axes !== null || this.box !== null) return;
+    const moving = boundsOf(run).flatMap(([low, high], i) => (high > low ? [i] : []));
+    if (moving.length < 2 || axes.some((i) => moving.includes(i))) return;
+    this.state.axes = [moving[0], moving[1]];
+    this.hooks.axesChosen(this.state.axes);
+  }
+
   private fitIfNeeded(run: Run, mayFit: boolean): void {
+    this.chooseAxes(run);
     const { axes, box } = this.state;
     if (this.spans.length === 0) this.spans = spansOf(run);
     if (axes !== null && this.box === null) this.box = boxOf(run, axes);

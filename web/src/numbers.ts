@@ -40,9 +40,10 @@ const GREEK: Readonly<Record<string, string>> = {
 };
 const BELOW = "₀₁₂₃₄₅₆₇₈₉";
 
-/** A name as it is printed in a text: `omega` is ω, digits at its end stand below the line. */
+/** A name as it is printed in a text: `omega` is ω, digits at its end, as in `x1` and `x[1]`, stand below the line. */
 export function showName(name: string): string {
-  const [, letters, digits] = /^([A-Za-z]+)_?(\d{0,2})$/.exec(name) ?? [];
-  if (letters === undefined) return name;
+  const plain = /^([A-Za-z]+)_?(\d{0,2})$/.exec(name) ?? /^([A-Za-z]+)\[(\d{1,2})\]$/.exec(name);
+  if (plain === null) return name;
+  const [, letters, digits] = plain;
   return (GREEK[letters] ?? letters) + [...digits].map((digit) => BELOW[Number(digit)]).join("");
 }

@@ -74,6 +74,7 @@ export interface Returns {
   readonly t: Float64Array;
   readonly y: Float64Array;
   readonly message: string;
+  readonly success: boolean;
 }
 
 /** Points of a diagram, the state at their end, and what went wrong at which values. */
@@ -122,7 +123,8 @@ export function toPlane(reply: Reply): Plane {
 
 export function toReturns(reply: Reply): Returns {
   const y = reply.table("y");
-  return { n: y.shape[1] ?? 1, t: reply.table("t").data, y: y.data, message: String(reply.header.message ?? "") };
+  const { message, success } = reply.header;
+  return { n: y.shape[1] ?? 1, t: reply.table("t").data, y: y.data, message: String(message ?? ""), success: success !== false };
 }
 
 export function toDiagramPart(reply: Reply): DiagramPart {

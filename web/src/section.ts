@@ -7,8 +7,8 @@ import { Points } from "./counts.ts";
 import { make, select } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
 import { Latest } from "./latest.ts";
-import { motionRequest, sectionRequest } from "./model.ts";
-import { count } from "./numbers.ts";
+import { longSpan, motionRequest, sectionRequest } from "./model.ts";
+import { count, showName } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { toReturns, type Returns } from "./replies.ts";
@@ -36,7 +36,7 @@ export class SectionPanel implements Panel {
       () => this.sentence(),
     );
     const update = () => this.update();
-    const names = (k: number) => [...model.states.map((name, i) => [String(i), name] as const), ...(k === 0 ? [[String(RETURN), "number of the return"] as const] : [])];
+    const names = (k: number) => [...model.states.map((name, i) => [String(i), showName(name)] as const), ...(k === 0 ? [[String(RETURN), "return"] as const] : [])];
     const axis = (k: 0 | 1) =>
       select(k === 0 ? "state across" : "state upwards", names(k), String(this.axes[k]), (value) => {
         this.axes[k] = Number(value);
@@ -108,12 +108,13 @@ export class SectionPanel implements Panel {
       const request = {
         kind: "section",
         ...motionRequest(state),
+        t_span: longSpan(state),
         section: sectionRequest(state.section, state.params),
         skip: state.skip,
         count: state.count,
       };
       this.found = toReturns(await engines.many()[0].ask(request));
-      this.picture.say(this.found.t.length === 0 ? noReturns(this.found.message) : null);
+      this.picture.say(this.found.t.length === 0 ? noReturns(this.found) : null);
       this.words.textContent = "";
       this.place();
     } catch (error) {
@@ -156,6 +157,7 @@ export class SectionPanel implements Panel {
   }
 }
 
-function noReturns(message: string): string {
-  return `The motion does not return to this section within its steps. ${message}`.trim();
+function noReturns({ success, message }: Returns): string {
+  const words = "The motion has no more than the left out returns to this section.";
+  return success ? words : `${words} ${message}`;
 }

@@ -2,6 +2,7 @@
 
 import { make, select } from "./dom.ts";
 import { labelled, numberField } from "./controls.ts";
+import { showName } from "./numbers.ts";
 import { frequencyOf, type Description, type Section, type State } from "./model.ts";
 
 /** The fields of a section; `changed` is called after each change. */
@@ -39,12 +40,12 @@ interface Option {
 function optionsOf(model: Description): Option[] {
   const options: Option[] = model.surfaces.map((surface) => ({
     key: `surface ${surface}`,
-    label: `the surface ${surface} = 0`,
+    label: `${showName(surface)} = 0`,
     section: { by: "surface", surface },
   }));
   const frequency = frequencyOf(model);
   if (frequency !== null) {
-    options.push({ key: "forcing", label: `each period 2π/${frequency}`, section: { by: "forcing", frequency, phase: 0 } });
+    options.push({ key: "forcing", label: `each period 2π/${showName(frequency)}`, section: { by: "forcing", frequency, phase: 0 } });
   }
   options.push({ key: "period", label: "each period of …", section: { by: "period", period: 2 * Math.PI, phase: 0 } });
   return options;
@@ -58,9 +59,9 @@ function keyOf(section: Section | null): string {
 export function showSection(section: Section | null): string {
   switch (section?.by) {
     case "surface":
-      return `at ${section.surface} = 0`;
+      return `at ${showName(section.surface)} = 0`;
     case "forcing":
-      return `each 2π/${section.frequency}`;
+      return `each 2π/${showName(section.frequency)}`;
     case "period":
       return "each period";
     default:

@@ -28,7 +28,7 @@ const RIGHT = 16;
 const GAP = 34;
 const ABOVE_STRIP = 30;
 const BELOW_STRIP = 44;
-const MOST_LINES = 60;
+const CLOSEST_LINES = 6;
 const MOST_MODES_NAMED = 8;
 
 /** Draw the panels; the scale of time is what a pointer needs. */
@@ -72,18 +72,7 @@ function drawPanel(pen: Pen, run: Run, state: number, frame: Frame, data: Series
   drawAxes(pen, frame, { xLabel: null, yLabel: data.states[state], yColour: colour }, theme);
   pen.save();
   clipTo(pen, frame);
-  const [bottom, top] = frame.y.places;
-  const inside = run.switches.filter(({ t }) => t >= data.window[0] && t <= data.window[1]);
-  if (inside.length <= MOST_LINES) {
-    pen.strokeStyle = theme.hair;
-    pen.lineWidth = 1;
-    pen.beginPath();
-    for (const { t } of inside) {
-      pen.moveTo(crisp(frame.x.at(t)), top);
-      pen.lineTo(crisp(frame.x.at(t)), bottom);
-    }
-    pen.stroke();
-  }
+  drawSwitches(pen, run, frame, theme);
   pen.strokeStyle = colour;
   pen.lineJoin = "round";
   for (const slides of [false, true]) {
@@ -109,6 +98,23 @@ function drawPanel(pen: Pen, run: Run, state: number, frame: Frame, data: Series
     pen.fill();
   }
   pen.restore();
+}
+
+/** A line for each switch, but for those that would merge. */
+function drawSwitches(pen: Pen, run: Run, frame: Frame, theme: Theme): void {
+  const [bottom, top] = frame.y.places;
+  pen.strokeStyle = theme.hair;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  let last = -Infinity;
+  for (const { t } of run.switches) {
+    const x = frame.x.at(t);
+    if (Math.abs(x - last) < CLOSEST_LINES) continue;
+    last = x;
+    pen.moveTo(crisp(x), top);
+    pen.lineTo(crisp(x), bottom);
+  }
+  pen.stroke();
 }
 
 function drawTime(pen: Pen, time: Frame["x"], y: number, theme: Theme): void {

@@ -29,6 +29,8 @@ test("names as they are printed", () => {
   assert.equal(showName("omega"), "ω");
   assert.equal(showName("x_12"), "x₁₂");
   assert.equal(showName("position"), "position");
-  assert.equal(showName("x[0]"), "x[0]");
+  assert.equal(showName("x[0]"), "x₀");
+  assert.equal(showName("x[0] - y"), "x[0] - y");
+  assert.equal(showName("x]"), "x]");
   assert.equal(showName("F_s"), "F_s");
 });
