@@ -16,7 +16,8 @@ import filippov as fl
 import numpy as np
 import pytest
 
-from app.conftest import STATIC, front, model_bytes, settle, wait_until
+from app.conftest import front, settle, wait_until
+from app.static_site import STATIC, model_bytes
 
 AXE = Path(__file__).resolve().parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
 

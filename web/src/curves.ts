@@ -1,7 +1,7 @@
 /** Curves of a run on a plane, piece by piece, and the places where the motion rests. */
 
 import type { Frame } from "./axes.ts";
-import { isSliding } from "./modes.ts";
+import { isSliding, sortModes } from "./modes.ts";
 import type { Pen } from "./pen.ts";
 import type { Piece, Run } from "./replies.ts";
 
@@ -69,17 +69,31 @@ export function dwellRadius(duration: number, whole: number): number {
   return whole > 0 ? Math.max(SMALLEST_DOT, DOT_OF_WHOLE_RUN * Math.sqrt(duration / whole)) : SMALLEST_DOT;
 }
 
-/** Bounds of the states of a run: `[low, high]` for each. */
-export function boundsOf(run: Run): [number, number][] {
-  const bounds: [number, number][] = Array.from({ length: run.n }, () => [Infinity, -Infinity]);
-  for (let k = 0; k < run.y.length; k++) {
-    const value = run.y[k];
-    const own = bounds[k % run.n];
-    if (value < own[0]) own[0] = value;
-    if (value > own[1]) own[1] = value;
-  }
-  return bounds;
+/** What is asked of a run at every drawing is computed once. */
+function remembered<T>(compute: (run: Run) => T): (run: Run) => T {
+  const known = new WeakMap<Run, T>();
+  return (run) => {
+    let found = known.get(run);
+    if (found === undefined) known.set(run, (found = compute(run)));
+    return found;
+  };
 }
+
+/** Bounds of the states of a run: `[low, high]` for each. */
+export const boundsOf = remembered((run): readonly (readonly [number, number])[] => {
+  const low = new Float64Array(run.n).fill(Infinity);
+  const high = new Float64Array(run.n).fill(-Infinity);
+  for (let k = 0, i = 0; k < run.y.length; k++) {
+    const value = run.y[k];
+    if (value < low[i]) low[i] = value;
+    if (value > high[i]) high[i] = value;
+    if (++i === run.n) i = 0;
+  }
+  return Array.from(low, (value, i) => [value, high[i]] as const);
+});
+
+/** The modes of a run, regions first. */
+export const modesOf = remembered((run): readonly string[] => sortModes(run.pieces.map((piece) => piece.mode)));
 
 /** The state and the mode at a time, between the points of the curve. */
 export function stateAt(run: Run, t: number): { y: number[]; mode: string } | null {
@@ -100,7 +114,7 @@ export function stateAt(run: Run, t: number): { y: number[]; mode: string } | nu
 }
 
 /** Rows between which the state jumps: the ends of pieces that do not meet. */
-export function findJumps(run: Run): [number, number][] {
+export const findJumps = remembered((run): readonly (readonly [number, number])[] => {
   const jumps: [number, number][] = [];
   const bounds = boundsOf(run);
   for (let k = 1; k < run.pieces.length; k++) {
@@ -109,4 +123,4 @@ export function findJumps(run: Run): [number, number][] {
     if (isJump) jumps.push([from, to]);
   }
   return jumps;
-}
+});

@@ -2,16 +2,17 @@
 
 import { BasinsPanel } from "./basins.ts";
 import { labelled, numberField, quantity, type Quantity } from "./controls.ts";
+import { CyclesPanel } from "./cycles.ts";
 import { DiagramPanel } from "./diagram.ts";
 import { button, freshId, make, select } from "./dom.ts";
 import { makeEditor, type TextReader } from "./editor.ts";
 import { showSwitches } from "./events.ts";
 import { curveCsv, save, switchesCsv, writePng, writeSvg } from "./export.ts";
-import { initialState, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
+import { initialState, motionRequest, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
 import { Motion } from "./motion.ts";
 import { count, showName, showNumber } from "./numbers.ts";
 import type { Context, Panel } from "./panel.ts";
-import type { Engines } from "./pool.ts";
+import { engineFor, type Engines } from "./pool.ts";
 import type { Run } from "./replies.ts";
 import { writeScript } from "./script.ts";
 import { SectionPanel } from "./section.ts";
@@ -40,6 +41,7 @@ const PLACE_NAMES: Record<Place, string> = {
   section: "Poincaré section",
   diagram: "Diagram",
   basins: "Basins",
+  cycles: "Cycles",
   model: "Model",
 };
 const METHODS = ["auto", "taylor", "dop853", "rodas5p", "midpoint"];
@@ -143,6 +145,11 @@ export class Front {
       engines,
       theme: () => this.theme,
       window: () => this.motion.window(),
+      end: () => {
+        const { run } = this.motion;
+        return run === null ? null : [...run.y.subarray(run.y.length - run.n)];
+      },
+      showCycle: (run) => this.motion.showCycle(run),
       start: (y0) => {
         state.y0.splice(0, model.n, ...y0);
         this.showValues();
@@ -158,6 +165,7 @@ export class Front {
     if (kinds.has("section")) this.panels.set("section", new SectionPanel(context));
     if (kinds.has("diagram") && model.params.length > 0) this.panels.set("diagram", new DiagramPanel(context));
     if (kinds.has("basins") && model.n > 1) this.panels.set("basins", new BasinsPanel(context));
+    if (engineFor(engines, "cycle") !== null) this.panels.set("cycles", new CyclesPanel(context));
   }
 
   private build(): void {
@@ -233,7 +241,7 @@ export class Front {
         list.append(make("div", { class: "file" }, make("span", {}, table.name), file("CSV", () => save(this.fileName(table.name, "csv"), table.text(), "text/csv"))));
       }
       list.append(
-        make("div", { class: "file" }, make("span", {}, "Python script"), file("py", () => save(this.fileName("run", "py"), this.script(), "text/x-python"))),
+        make("div", { class: "file" }, make("span", {}, "Python script"), file("py", () => void this.script().then((text) => save(this.fileName("run", "py"), text, "text/x-python")))),
       );
     };
     menu.addEventListener("toggle", () => menu.open && fill());
@@ -250,8 +258,16 @@ export class Front {
     return `${this.host.problem ?? "filippov"}_${name.replaceAll(" ", "_")}.${kind}`;
   }
 
-  private script(): string {
-    return writeScript(this.model, this.state, this.host.bytes);
+  /** The kernel knows where its system comes from; without one the page writes what it has. */
+  private async script(): Promise<string> {
+    const engine = engineFor(this.engines, "script");
+    if (engine === null) return writeScript(this.model, this.state, this.host.bytes);
+    try {
+      return String((await engine.ask({ kind: "script", ...motionRequest(this.state) })).header.text);
+    } catch (error) {
+      this.say((error as Error).message);
+      return writeScript(this.model, this.state, this.host.bytes);
+    }
   }
 
   private buildControls(): HTMLElement {

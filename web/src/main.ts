@@ -5,7 +5,7 @@ import { HttpEngine, CommEngine, type Comm } from "./engine.remote.ts";
 import { WASM_KINDS, type Engine } from "./engine.ts";
 import { makeTextReader, type TextReader } from "./editor.ts";
 import { Front, type Host } from "./front.ts";
-import { describe, type Description, type State } from "./model.ts";
+import { describe, toDescription, type Description, type State } from "./model.ts";
 import { makeEngines, single, type Engines } from "./pool.ts";
 import { fromBase64, readFragment, toState } from "./share.ts";
 import { applyTheme, DARK, LIGHT } from "./theme.ts";
@@ -63,6 +63,8 @@ export async function boot(element: HTMLElement): Promise<void> {
   await open();
 }
 
+/** Make the engines of a model, and what puts its front into the page. */
+type Show = (bytes: Uint8Array, problem: string | null, kernel?: Engine | null) => Promise<() => Front>;
 type Open = (again: () => Promise<void>) => void;
 
 /** All that is needed for a front; it is put into the element by the function returned, when all has come. */
@@ -78,8 +80,8 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
     openProblem: (name: string) => goTo(name === "" ? home : `p=${encodeURIComponent(name)}`),
     reader: fetchReader,
   };
-  const show = async (bytes: Uint8Array, problem: string | null): Promise<() => Front> => {
-    const engines = await makeEngines(await fetchModule(), bytes);
+  const show: Show = async (bytes, problem, kernel = null) => {
+    const engines = await makeEngines(await fetchModule(), bytes, kernel);
     const model = await describe(engines.quick);
     const openModel = (read: Uint8Array, text: string) =>
       run(async () => {
@@ -103,27 +105,26 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
 async function fromServer(
   element: HTMLElement,
   token: string,
-  show: (bytes: Uint8Array, problem: string | null) => Promise<() => Front>,
+  show: Show,
 ): Promise<() => Front> {
   const response = await fetch("model", { headers: { "X-Filippov-Token": token } });
   if (response.status !== 200 && response.status !== 204) {
     throw new Error((await response.text()) || `The local server gives no model (${response.status}).`);
   }
   const bytes = response.status === 204 ? null : new Uint8Array(await response.arrayBuffer());
+  const asked = new HttpEngine("ask", token, WASM_KINDS);
+  const { header } = await asked.ask({ kind: "describe" });
+  const kernel = new HttpEngine("ask", token, new Set((header.kinds as string[] | undefined) ?? WASM_KINDS));
   if (bytes !== null && bytes.length > 0) {
     try {
-      return await show(bytes, null);
+      return await show(bytes, null, kernel);
     } catch (error) {
       // without WebAssembly, or for a model that it does not hold, the kernel computes
       if (error instanceof EngineError && error.code === "trap") throw error;
     }
   }
-  const first = new HttpEngine("ask", token, WASM_KINDS);
-  const reply = await first.ask({ kind: "describe" });
-  const kinds = reply.header.kinds as string[] | undefined;
-  const engine = kinds ? new HttpEngine("ask", token, new Set(kinds)) : first;
-  const model = await describe(engine);
-  return () => mount(element, { engine, model, host: { bytes, reader: () => Promise.resolve(null) } });
+  const model = toDescription(header);
+  return () => mount(element, { engine: kernel, model, host: { bytes } });
 }
 
 async function fetchModule(): Promise<WebAssembly.Module> {
@@ -216,15 +217,16 @@ async function render({ model: widget, el }: { model: WidgetModel; el: HTMLEleme
 
 async function widgetEngine(widget: WidgetModel, bytes: Uint8Array | null): Promise<Engine | Engines> {
   const wasm = toBytes(widget.get("wasm"));
+  const kinds = widget.get("kinds") as string[] | undefined;
+  const kernel = new CommEngine(widget, kinds ? new Set(kinds) : WASM_KINDS);
   if (wasm !== null && bytes !== null) {
     try {
-      return await makeEngines(await WebAssembly.compile(wasm as Uint8Array<ArrayBuffer>), bytes);
+      return await makeEngines(await WebAssembly.compile(wasm as Uint8Array<ArrayBuffer>), bytes, kernel);
     } catch {
       // the kernel computes where the notebook allows no WebAssembly
     }
   }
-  const kinds = widget.get("kinds") as string[] | undefined;
-  return new CommEngine(widget, kinds ? new Set(kinds) : WASM_KINDS);
+  return kernel;
 }
 
 /** The bytes of a trait; `null` if it is empty. */

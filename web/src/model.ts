@@ -27,7 +27,7 @@ export interface Description {
   readonly version: string;
 }
 
-export const PLACES = ["switches", "section", "diagram", "basins", "model"] as const;
+export const PLACES = ["switches", "section", "diagram", "basins", "cycles", "model"] as const;
 export type Place = (typeof PLACES)[number];
 
 /** The returns to a surface, the states at the ticks of a period, or of the period of a forcing, 2 pi / frequency. */

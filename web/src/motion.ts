@@ -46,6 +46,7 @@ export class Motion {
   readonly series: Picture;
   run: Run | null = null;
   private kept: Run[] = [];
+  private cycle: Run | null = null;
   private plane: Plane | null = null;
   private box: Box | null = null;
   private spans: Interval[] = [];
@@ -123,6 +124,12 @@ export class Motion {
 
   get panels(): readonly number[] {
     return this.shown;
+  }
+
+  /** Draw a cycle over everything else, or take it away. */
+  showCycle(run: Run | null): void {
+    this.cycle = run;
+    this.portrait?.redraw();
   }
 
   keep(): void {
@@ -259,6 +266,7 @@ export class Motion {
     return {
       run,
       kept,
+      cycle: this.cycle,
       plane,
       axes: this.state.axes ?? [0, 0],
       box: this.window(),

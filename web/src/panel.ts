@@ -3,6 +3,7 @@
 import type { Engines } from "./pool.ts";
 import type { Drawing } from "./export.ts";
 import type { Description, State } from "./model.ts";
+import type { Run } from "./replies.ts";
 import type { Theme } from "./theme.ts";
 
 /** What a place may know and do. */
@@ -13,6 +14,10 @@ export interface Context {
   theme(): Theme;
   /** The window of the portrait. */
   window(): { readonly x: readonly [number, number]; readonly y: readonly [number, number] };
+  /** The last state of the run on the screen. */
+  end(): number[] | null;
+  /** Draw a cycle in the portrait, or take it away. */
+  showCycle(run: Run | null): void;
   /** Start the motion elsewhere, as a click in a picture does. */
   start(y0: number[]): void;
   /** Set a parameter, as its slider does. */

@@ -143,22 +143,25 @@ export async function askAll(
 /** An engine for the pictures that follow the sliders, and engines for work in many parts. */
 export interface Engines {
   readonly quick: Engine;
+  /** The kernel, for what only it can do. */
+  readonly kernel: Engine | null;
   many(): readonly Engine[];
   close(): void;
 }
 
 /** Engines in workers, or in the page where the host allows no workers. */
-export async function makeEngines(module: WebAssembly.Module, model: Uint8Array): Promise<Engines> {
+export async function makeEngines(module: WebAssembly.Module, model: Uint8Array, kernel: Engine | null = null): Promise<Engines> {
   const quick = new WorkerEngine(module, model);
   try {
     await quick.start();
   } catch (error) {
     if (error instanceof EngineError && error.code !== "worker") throw error; // the model, not the worker
-    return single(await WasmEngine.create(module, model));
+    return single(await WasmEngine.create(module, model), kernel);
   }
   let pool: WorkerEngine[] = [];
   return {
     quick,
+    kernel,
     many() {
       if (pool.length === 0) {
         const count = countWorkers(navigator.hardwareConcurrency);
@@ -168,11 +171,22 @@ export async function makeEngines(module: WebAssembly.Module, model: Uint8Array)
     },
     close() {
       for (const engine of [quick, ...pool]) engine.close();
+      kernel?.close();
     },
   };
 }
 
 /** One engine for all work: that of the kernel, or of a page without workers. */
-export function single(engine: Engine): Engines {
-  return { quick: engine, many: () => [engine], close: () => engine.close() };
+export function single(engine: Engine, kernel: Engine | null = null): Engines {
+  const close = () => {
+    engine.close();
+    kernel?.close();
+  };
+  return { quick: engine, kernel, many: () => [engine], close };
+}
+
+/** The engine that answers a kind of request; `null` if there is none. */
+export function engineFor({ quick, kernel }: Engines, kind: string): Engine | null {
+  if (quick.kinds.has(kind)) return quick;
+  return kernel?.kinds.has(kind) ? kernel : null;
 }

@@ -1,9 +1,9 @@
 /** The phase portrait: a plane of two states with the trajectory, surfaces, arrows of the field, and equilibria. */
 
 import { clipTo, drawAxes, frameIn, padded, type Frame, type Interval } from "./axes.ts";
-import { boundsOf, coordinate, dwellRadius, findDwells, findJumps, tracePiece } from "./curves.ts";
+import { boundsOf, coordinate, dwellRadius, findDwells, findJumps, modesOf, tracePiece } from "./curves.ts";
 import { dotEntry, drawKey, layKey, lineEntry, modeEntry, SAMPLE, type KeyEntry } from "./key.ts";
-import { explainMode, isSliding, modeColour, sortModes } from "./modes.ts";
+import { explainMode, isSliding, modeColour } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, type Pen } from "./pen.ts";
 import type { Equilibrium, Plane, Run, SurfaceKind } from "./replies.ts";
@@ -17,6 +17,7 @@ export interface Box {
 export interface PortraitData {
   readonly run: Run | null;
   readonly kept: readonly Run[];
+  readonly cycle: Run | null;
   readonly plane: Plane | null;
   readonly axes: readonly [number, number];
   readonly box: Box;
@@ -33,6 +34,7 @@ const SIDES = { left: 58, right: 16, top: 30 };
 const BELOW_AXIS = 46;
 const ARROW = 9;
 const MOST_MODES_NAMED = 8;
+const CYCLE_WIDTH = 2.4;
 
 /** Draw the portrait; the frame is what a pointer needs. */
 export function drawPortrait(pen: Pen, width: number, height: number, data: PortraitData, theme: Theme): Frame {
@@ -53,6 +55,7 @@ export function drawPortrait(pen: Pen, width: number, height: number, data: Port
   for (const run of data.kept) drawRun(pen, run, data.axes, frame, theme);
   pen.globalAlpha = 1;
   if (data.run) drawRun(pen, data.run, data.axes, frame, theme);
+  if (data.cycle) drawCycle(pen, data.cycle, data.axes, frame, theme);
   for (const point of data.plane?.equilibria ?? []) drawEquilibrium(pen, point, data.axes, frame, theme);
   drawStart(pen, data, frame, theme);
   if (data.marked) drawMark(pen, frame.x.at(data.marked[i]), frame.y.at(data.marked[j]), theme);
@@ -82,7 +85,7 @@ function drawRun(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: F
   pen.setLineDash([]);
   // sliding lies on the rest, for it is what the eye should find
   for (const slides of [false, true]) {
-    for (const mode of sortModes(run.pieces.map((piece) => piece.mode))) {
+    for (const mode of modesOf(run)) {
       if (isSliding(mode) !== slides) continue;
       pen.strokeStyle = modeColour(mode, theme.colours);
       pen.lineWidth = slides ? SLIDING_WIDTH : SMOOTH_WIDTH;
@@ -109,6 +112,21 @@ function drawRun(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: F
     pen.lineWidth = 1.2;
     pen.stroke();
   }
+}
+
+/** A cycle lies on the trajectories, heavy, with a rim. */
+function drawCycle(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: Frame, theme: Theme): void {
+  for (const [colour, width] of [[theme.ground, CYCLE_WIDTH + 2.4], [cycleColour(theme), CYCLE_WIDTH]] as const) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = width;
+    pen.beginPath();
+    for (const piece of run.pieces) tracePiece(pen, run, piece, i, j, frame);
+    pen.stroke();
+  }
+}
+
+function cycleColour(theme: Theme): string {
+  return theme.colours[5];
 }
 
 function drawField(pen: Pen, { field }: Plane, frame: Frame, theme: Theme): void {
@@ -216,7 +234,7 @@ function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
   const entries: KeyEntry[] = [];
   const { plane, run } = data;
   if (data.withModes && run) {
-    for (const mode of sortModes(run.pieces.map((piece) => piece.mode)).slice(0, MOST_MODES_NAMED)) {
+    for (const mode of modesOf(run).slice(0, MOST_MODES_NAMED)) {
       entries.push(modeEntry(explainMode(mode, data.surfaces), modeColour(mode, theme.colours), isSliding(mode)));
     }
   }
@@ -235,6 +253,7 @@ function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
       });
     }
   }
+  if (data.cycle) entries.push(lineEntry("cycle", cycleColour(theme), CYCLE_WIDTH));
   if (run && hasDwell(run, data.axes, data.box)) entries.push(dotEntry("at rest, by its duration", theme.muted));
   return entries;
 }
@@ -252,7 +271,7 @@ export function describePortrait(data: PortraitData): string {
   if (!run) return `${plot}.`;
   const last = (run.t.length - 1) * run.n;
   const at = (offset: number) => axes.map((k) => showNumber(run.y[offset + k], 4)).join(", ");
-  const modes = sortModes(run.pieces.map((piece) => piece.mode));
+  const modes = modesOf(run);
   const points = plane?.equilibria.filter((point) => point.admissible) ?? [];
   const slides = run.pieces.filter((piece) => isSliding(piece.mode)).length;
   return (

@@ -92,6 +92,28 @@ export interface Basins {
   readonly labels: readonly string[];
 }
 
+/** A limit cycle: the run over one period, and what is known of it. */
+export interface Cycle {
+  readonly run: Run;
+  readonly period: number;
+  readonly multipliers: readonly (readonly [number, number])[];
+  readonly stable: boolean | null;
+  readonly text: string;
+}
+
+/** A branch over a parameter; `y`, `low`, `high` hold rows of `n` states, `stable` 1, 0, or NaN. */
+export interface Branch {
+  readonly n: number;
+  readonly parameter: string;
+  readonly value: Float64Array;
+  readonly y: Float64Array;
+  readonly low: Float64Array | null;
+  readonly high: Float64Array | null;
+  readonly stable: Float64Array;
+  readonly special: readonly { readonly index: number; readonly value: number; readonly code: string; readonly text: string }[];
+  readonly text: string;
+}
+
 export function toRun(reply: Reply): Run {
   const header = reply.header;
   const y = reply.table("y");
@@ -140,6 +162,33 @@ export function toBasins(reply: Reply): Basins {
   const { data, shape } = reply.table("label");
   if (shape.length !== 2) throw new EngineError("the labels of the basins are no table", "reply");
   return { rows: shape[0], columns: shape[1], label: data, labels: (reply.header.labels ?? []) as string[] };
+}
+
+export function toCycle(reply: Reply): Cycle {
+  const { period, multipliers, stable, text } = reply.header;
+  return {
+    run: toRun(reply),
+    period: Number(period),
+    multipliers: (multipliers ?? []) as Cycle["multipliers"],
+    stable: (stable ?? null) as boolean | null,
+    text: String(text ?? ""),
+  };
+}
+
+export function toBranch(reply: Reply): Branch {
+  const y = reply.table("y");
+  const optional = (name: string) => (reply.has(name) ? reply.table(name).data : null);
+  return {
+    n: y.shape[1] ?? 1,
+    parameter: String(reply.header.parameter ?? ""),
+    value: reply.table("value").data,
+    y: y.data,
+    low: optional("low"),
+    high: optional("high"),
+    stable: reply.table("stable").data,
+    special: (reply.header.special ?? []) as Branch["special"],
+    text: String(reply.header.text ?? ""),
+  };
 }
 
 function toNotice(given: Notice | string): Notice {

@@ -1,9 +1,9 @@
 /** The time series: a panel for each state, the strip of modes below them, and the axis of time. */
 
 import { clipTo, crisp, drawAxes, linear, padded, ticksOf, type Frame, type Interval } from "./axes.ts";
-import { boundsOf, findJumps, TIME, tracePiece } from "./curves.ts";
+import { boundsOf, findJumps, modesOf, TIME, tracePiece } from "./curves.ts";
 import { drawKey, layKey, modeEntry } from "./key.ts";
-import { explainMode, isSliding, modeColour, sortModes } from "./modes.ts";
+import { explainMode, isSliding, modeColour } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import type { Run } from "./replies.ts";
@@ -36,7 +36,7 @@ export function drawSeries(pen: Pen, width: number, height: number, data: Series
   const { run, shown } = data;
   const time = linear(data.window, [LEFT, Math.max(LEFT + 10, width - RIGHT)]);
   if (!run) return time;
-  const modes = sortModes(run.pieces.map((piece) => piece.mode));
+  const modes = modesOf(run);
   const entries = modes
     .slice(0, MOST_MODES_NAMED)
     .map((mode) => modeEntry(explainMode(mode, data.surfaces), modeColour(mode, theme.colours), isSliding(mode)));

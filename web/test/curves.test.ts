@@ -1,5 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { describeBranch, drawBranch } from "../src/branch.ts";
+import type { Branch } from "../src/replies.ts";
 import { frameIn } from "../src/axes.ts";
 import { boundsOf, dwellRadius, findDwells, findJumps, stateAt } from "../src/curves.ts";
 import { boxOf, describePortrait, drawPortrait, fits, type PortraitData } from "../src/portrait.ts";
@@ -55,6 +57,7 @@ function portraitData(): PortraitData {
   return {
     run,
     kept: [],
+    cycle: null,
     plane: {
       parts: [
         { surface: "v", kind: "attracting", first: 0, last: 1 },
@@ -111,4 +114,25 @@ test("the time series has a panel for each state, and the strip has the modes", 
   for (const colour of LIGHT.colours.slice(0, 3)) assert.ok(svg.includes(`fill="${colour}"`), colour);
   assert.ok(!svg.includes("NaN"));
   assert.match(describeSeries(data), /y between 1 and 2, v between −1 and 2; 2 switches/);
+});
+
+test("a branch is solid where it is stable and dashed where it is not, with its special points", () => {
+  const branch: Branch = {
+    n: 2,
+    parameter: "F",
+    value: Float64Array.from([0, 1, 2, 3]),
+    y: new Float64Array(8),
+    low: Float64Array.from([-1, 0, -2, 0, -3, 0, -4, 0]),
+    high: Float64Array.from([1, 0, 2, 0, 3, 0, 4, 0]),
+    stable: Float64Array.from([1, 1, 0, NaN]),
+    special: [{ index: 2, value: 2, code: "LP", text: "a fold" }],
+    text: "It folds once.",
+  };
+  const data = { branch, state: 0, labels: ["F", "y"] as const, here: 1.5 };
+  const pen = new SvgPen(500, 300, () => "data:,");
+  drawBranch(pen, 500, 300, data, LIGHT);
+  const svg = pen.toString();
+  assert.ok(svg.includes('stroke-width="2.2"') && svg.includes('stroke-dasharray="6 4"') && svg.includes(">LP<"));
+  assert.ok(svg.includes("stability not known") && !svg.includes("NaN"));
+  assert.match(describeBranch(data), /4 points\. It folds once\. Special points: LP at F = 2\./);
 });

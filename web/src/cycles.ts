@@ -1,0 +1,180 @@
+/** Limit cycles and their branches: computed by the kernel, shown only where there is one. */
+
+import { describeBranch, drawBranch, type BranchData } from "./branch.ts";
+import { labelled, numberField } from "./controls.ts";
+import { button, make, select } from "./dom.ts";
+import { pointsCsv } from "./export.ts";
+import { Job } from "./job.ts";
+import { motionRequest, sectionRequest } from "./model.ts";
+import { showName, showNumber } from "./numbers.ts";
+import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
+import { Picture } from "./picture.ts";
+import { engineFor } from "./pool.ts";
+import { toBranch, toCycle, type Branch } from "./replies.ts";
+
+export class CyclesPanel implements Panel {
+  readonly element: HTMLElement;
+  private readonly picture: Picture;
+  private readonly words = make("p", { class: "quiet", role: "status" });
+  private readonly branchWords = make("p", { class: "quiet", role: "status" });
+  private readonly multipliers = make("p", { class: "quiet" });
+  private readonly go = button("Find the cycle that this run leads to", () => this.press(() => this.find()));
+  private readonly follow = button("Follow", () => this.press(() => this.continue()));
+  private readonly job = new Job();
+  private branch: Branch | null = null;
+  private of: "cycle" | "equilibrium" = "cycle";
+  private foundFor = "";
+  /** A point of the cycle that was found: the branch starts there. */
+  private start: number[] | null = null;
+
+  constructor(private readonly context: Context) {
+    const { model, state } = context;
+    this.picture = new Picture(
+      "branch",
+      (pen, w, h, theme) => void drawBranch(pen, w, h, this.data(), theme),
+      () => context.theme(),
+      () => describeBranch(this.data()),
+    );
+    const range = (k: 0 | 1) =>
+      numberField(k === 0 ? "from" : "to", state.range?.[k] ?? k, (value) => {
+        const next: [number, number] = [...(state.range ?? [0, 1])];
+        next[k] = value;
+        state.range = next;
+      });
+    const of = select("what is followed", [["cycle", "the cycle"], ["equilibrium", "the equilibrium nearby"]], this.of, (value) => (this.of = value as typeof this.of));
+    const parameter = select("parameter", model.params.map(({ name }) => [name, showName(name)] as const), state.parameter ?? "", (name) => (state.parameter = name));
+    const coordinate = select("state", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.coordinate), (value) => {
+      state.coordinate = Number(value);
+      this.picture.redraw();
+    });
+    const canFollow = engineFor(context.engines, "continuation") !== null && model.params.length > 0;
+    this.element = make(
+      "div",
+      { class: "panel" },
+      make("div", { class: "row" }, this.go, this.words),
+      this.multipliers,
+      canFollow
+        ? make(
+            "form",
+            { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
+            labelled("follow", of),
+            labelled("over", parameter),
+            range(0),
+            range(1),
+            labelled("drawn by", coordinate),
+            this.follow,
+          )
+        : null,
+      this.branchWords,
+      canFollow ? this.picture.element : null,
+    );
+    this.picture.say("A branch is drawn here: cycles by the least and the greatest value of a state.");
+  }
+
+  show(): void {}
+
+  hide(): void {}
+
+  update(): void {
+    if (this.foundFor !== "" && this.foundFor !== this.motionKey()) {
+      this.foundFor = "";
+      this.start = null;
+      this.context.showCycle(null);
+      this.words.textContent = "The parameters have changed since the cycle was found.";
+      this.multipliers.textContent = "";
+    }
+    this.picture.redraw();
+  }
+
+  redraw(): void {
+    this.picture.redraw();
+  }
+
+  settled(): Promise<void> {
+    return this.job.settled();
+  }
+
+  close(): void {
+    this.job.stop();
+    this.picture.close();
+  }
+
+  saveables(): Saveable[] {
+    if (!this.branch) return [];
+    const { width, height } = this.picture;
+    return [{ name: "branch", width, height, draw: (pen, w, h, theme) => void drawBranch(pen, w, h, this.data(), theme) }];
+  }
+
+  numbers(): NumbersFile[] {
+    const { branch } = this;
+    if (!branch) return [];
+    const { states } = this.context.model;
+    const column = (i: number) => Float64Array.from({ length: branch.value.length }, (_, k) => branch.y[k * branch.n + i]);
+    return [
+      {
+        name: "branch",
+        text: () => pointsCsv([branch.parameter, ...states, "stable"], [branch.value, ...states.map((_, i) => column(i)), branch.stable]),
+      },
+    ];
+  }
+
+  private press(work: () => Promise<void>): void {
+    if (this.job.isRunning) this.job.stop();
+    else void this.job.start(() => work());
+  }
+
+  private async find(): Promise<void> {
+    const { state, engines } = this.context;
+    const engine = engineFor(engines, "cycle");
+    if (engine === null) return;
+    this.words.textContent = "The kernel is looking for it.";
+    try {
+      const section = state.section === null ? {} : { section: sectionRequest(state.section, state.params) };
+      const request = { kind: "cycle", ...motionRequest(state), y0: this.context.end() ?? state.y0, ...section };
+      const cycle = toCycle(await engine.ask(request));
+      this.start = [...cycle.run.y.subarray(0, cycle.run.n)];
+      this.foundFor = this.motionKey();
+      this.context.showCycle(cycle.run);
+      this.words.textContent = cycle.text || `A ${cycle.stable ? "stable" : "unstable"} cycle of period ${showNumber(cycle.period)}.`;
+      this.multipliers.textContent = cycle.multipliers.length ? `Multipliers: ${cycle.multipliers.map(showComplex).join(",  ")}` : "";
+    } catch (error) {
+      this.words.textContent = wordsOf(error) ?? "Stopped.";
+    }
+  }
+
+  private async continue(): Promise<void> {
+    const { state, engines } = this.context;
+    const engine = engineFor(engines, "continuation");
+    if (engine === null) return;
+    this.branchWords.textContent = "The kernel is following it.";
+    try {
+      const { parameter, range } = state;
+      const y0 = this.start ?? this.context.end() ?? state.y0;
+      const request = { kind: "continuation", ...motionRequest(state), y0, parameter, range, of: this.of };
+      this.branch = toBranch(await engine.ask(request));
+      this.branchWords.textContent = this.branch.text;
+      this.picture.say(this.branch.value.length === 0 ? "The branch has no points." : null);
+    } catch (error) {
+      this.branch = null;
+      this.branchWords.textContent = "";
+      this.picture.say(wordsOf(error) ?? "Stopped.");
+    }
+    this.picture.redraw();
+  }
+
+  private data(): BranchData {
+    const { model, state } = this.context;
+    const parameter = this.branch?.parameter ?? state.parameter ?? "";
+    return { branch: this.branch, state: state.coordinate, labels: [parameter, model.states[state.coordinate]], here: state.params[parameter] };
+  }
+
+  private motionKey(): string {
+    const { params, rtol, atol, method } = this.context.state;
+    return JSON.stringify([params, rtol, atol, method]);
+  }
+}
+
+function showComplex([re, im]: readonly [number, number]): string {
+  if (Math.abs(im) < 1e-12 * Math.max(1, Math.abs(re))) return showNumber(re, 5);
+  return `${showNumber(re, 5)} ${im < 0 ? "−" : "+"} ${showNumber(Math.abs(im), 5)}i`;
+}
