@@ -38,7 +38,7 @@ export function ticksOf([low, high]: Interval, wanted: number): Ticks {
   if (!(size > 0) || !Number.isFinite(size)) return { step: 0, values: [low], show: String };
   const raw = size / Math.max(1, wanted);
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * ([1, 2, 5, 10].find((factor) => factor * power >= raw * (1 - 1e-9)) ?? 10);
+  const step = power * ([1, 2, 5, 10].find((factor) => factor * power >= 0.8 * raw) ?? 10);
   const values: number[] = [];
   const first = Math.ceil(low / step - 1e-9);
   for (let k = first; k * step <= high + 1e-9 * step; k++) values.push(k * step);

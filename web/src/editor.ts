@@ -76,21 +76,23 @@ def oscillator(t, x, F=0.4, omega=1/3):
     return v, -y + np.sin(omega * t) - F * np.sign(v)
 `;
 
+export interface Editor {
+  readonly element: HTMLElement;
+  /** The editor is seen: the reader is fetched now, the first time. */
+  show(): void;
+}
+
 /** The editor: a text area, a button, and words on what could not be read. */
-export function makeEditor(options: EditorOptions): HTMLElement {
+export function makeEditor(options: EditorOptions): Editor {
   const id = freshId("text");
   const area = make("textarea", { id, spellcheck: "false", rows: 14, autocapitalize: "off", autocomplete: "off" });
   area.value = options.text ?? EXAMPLE;
   const words = make("p", { class: "quiet", role: "status" });
   const go = button("Use this text", () => void use());
-  const element = make(
-    "div",
-    { class: "editor" },
-    make("label", { for: id }, "The right-hand side in Python"),
-    area,
-    make("div", { class: "row" }, go, words),
-  );
+  const label = make("label", { for: id }, "The right-hand side in Python");
+  const element = make("div", { class: "editor" }, label, area, make("div", { class: "row" }, go, words));
   let reader: TextReader | null = null;
+  let isPrepared = false;
 
   area.addEventListener("keydown", (event) => {
     if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) void use();
@@ -99,12 +101,12 @@ export function makeEditor(options: EditorOptions): HTMLElement {
   async function prepare(): Promise<void> {
     reader = await options.reader().catch(() => null);
     if (reader === null) {
-      go.disabled = true;
+      go.hidden = true;
       area.readOnly = true;
       words.textContent = options.text
         ? "This page shows the text; it has no reader of Python text (filippov_text.wasm), so it cannot be edited here."
         : "This page has no reader of Python text (filippov_text.wasm). In Python, fl.explore(system) opens a system of your own.";
-      if (options.text === null) area.hidden = true;
+      area.hidden = label.hidden = options.text === null;
     } else {
       words.textContent = "Ctrl+Enter reads it. Nothing is sent anywhere, and no Python runs.";
     }
@@ -125,8 +127,13 @@ export function makeEditor(options: EditorOptions): HTMLElement {
     }
   }
 
-  void prepare();
-  return element;
+  return {
+    element,
+    show() {
+      if (!isPrepared) void prepare();
+      isPrepared = true;
+    },
+  };
 }
 
 function selectLine(area: HTMLTextAreaElement, line: number): void {

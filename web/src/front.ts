@@ -5,7 +5,7 @@ import { labelled, numberField, quantity, type Quantity } from "./controls.ts";
 import { CyclesPanel } from "./cycles.ts";
 import { DiagramPanel } from "./diagram.ts";
 import { button, freshId, make, select } from "./dom.ts";
-import { makeEditor, type TextReader } from "./editor.ts";
+import { makeEditor, type Editor, type TextReader } from "./editor.ts";
 import { showSwitches } from "./events.ts";
 import { curveCsv, save, switchesCsv, writePng, writeSvg } from "./export.ts";
 import { initialState, motionRequest, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
@@ -58,6 +58,7 @@ export class Front {
   private readonly planeWords = make("p", { class: "quiet", role: "status" });
   private readonly reading = make("p", { class: "reading", "aria-hidden": "true" });
   private readonly hint = make("p", { class: "quiet" }, "Click in the portrait to start elsewhere.");
+  private editor: Editor | null = null;
   private axisFields: HTMLSelectElement[] = [];
   private readonly stopButton = button("Stop", () => this.motion.stop());
   private readonly notice = make("p", { class: "notice", role: "status" });
@@ -187,7 +188,7 @@ export class Front {
 
   private buildHeader(): HTMLElement {
     const { model, host } = this;
-    const { title } = model.page;
+    const title = model.page.title === host.problem ? "" : model.page.title;
     const known = host.problems.map((problem) => [problem.name, problem.title] as const);
     const isKnown = host.problem !== null && known.some(([name]) => name === host.problem);
     const own = isKnown ? [] : ([["", host.problem ?? "this model"]] as const);
@@ -399,17 +400,18 @@ export class Front {
     ];
     const facts = make("dl", { class: "facts" });
     for (const [term, text] of rows) if (text) facts.append(make("dt", {}, term), make("dd", {}, text));
-    const editor = makeEditor({
+    this.editor = makeEditor({
       text: model.page.text,
       reader: () => (host.openModel ? host.reader() : Promise.resolve(null)),
       open: (bytes, text) => host.openModel?.(bytes, text),
     });
-    return make("div", { class: "panel model" }, facts, editor);
+    return make("div", { class: "panel model" }, facts, this.editor.element);
   }
 
   private showPlace(place: Place): void {
     const chosen = this.tabs.has(place) ? place : "switches";
     this.state.place = chosen;
+    if (chosen === "model") this.editor?.show();
     for (const [name, { tab, body }] of this.tabs) {
       const isChosen = name === chosen;
       tab.setAttribute("aria-selected", String(isChosen));

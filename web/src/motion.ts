@@ -39,6 +39,7 @@ interface Asked {
 const MOST_PANELS = 4;
 const LONG = 250; // milliseconds
 const CELLS = 72;
+const [FEWEST_ARROWS, MOST_ARROWS, PIXELS_PER_ARROW] = [8, 24, 22];
 const KEY_STEP = 0.01; // of the window
 
 export class Motion {
@@ -215,8 +216,11 @@ export class Motion {
     const { axes, params, y0, t_span } = this.state;
     if (axes === null || this.box === null) return;
     const { x, y } = this.box;
+    const size = Math.min(this.portrait?.width ?? 0, this.portrait?.height ?? 0);
+    const arrows = Math.min(MOST_ARROWS, Math.max(FEWEST_ARROWS, Math.round(size / PIXELS_PER_ARROW)));
     try {
-      const request = { kind: "portrait", t: t_span[0], params, axes, box: [...x, ...y], rest: y0, cells: CELLS };
+      const box = [...x, ...y];
+      const request = { kind: "portrait", t: t_span[0], params, axes, box, rest: y0, cells: CELLS, arrows };
       this.plane = toPlane(await this.engine.ask(request, this.stopper.signal));
       this.hooks.planed(null);
     } catch (error) {
