@@ -132,7 +132,9 @@ export class BasinsPanel implements Panel {
         const size = Math.min(cells, this.cells);
         const { x, y } = this.box;
         const request = { kind: "basins", ...motionRequest(state), axes: state.axes, box: [...x, ...y], cells: size };
-        this.basins = toBasins(await engines.many()[0].ask(request, signal));
+        const found = toBasins(await engines.many()[0].ask(request, signal));
+        signal.throwIfAborted();
+        this.basins = found;
         this.words.textContent = `${size} by ${size} cells · ${count(this.basins.labels.length, "end")} · click to start there`;
         this.picture.redraw();
         if (size === this.cells) break;

@@ -49,7 +49,7 @@ function drawDots(pen: Pen, points: Points, frame: Frame, theme: Theme): void {
   clipTo(pen, frame);
   pen.fillStyle = theme.ink;
   pen.globalAlpha = points.length > 600 ? 0.55 : 0.8;
-  const radius = points.length > 600 ? 1.2 : 1.8;
+  const radius = points.length > 600 ? 1.2 : 2.4;
   const { x, y } = points;
   for (let k = 0; k < x.length; k++) {
     if (!Number.isFinite(x[k]) || !Number.isFinite(y[k])) continue;

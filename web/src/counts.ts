@@ -31,6 +31,18 @@ export class Points {
     return this.columns[1].subarray(0, this.length);
   }
 
+  /** Keep the points whose first coordinate lies in an interval. */
+  keepWithin(low: number, high: number): void {
+    const [x, y] = this.columns;
+    let kept = 0;
+    for (let k = 0; k < this.length; k++) {
+      if (!(x[k] >= low && x[k] <= high)) continue;
+      x[kept] = x[k];
+      y[kept++] = y[k];
+    }
+    this.length = kept;
+  }
+
   clear(): void {
     this.length = 0;
   }

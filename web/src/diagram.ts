@@ -135,6 +135,15 @@ export class DiagramPanel implements Panel {
   }
 
   private begin(): void {
+    this.points.clear();
+    void this.job.start((signal) => this.compute(signal));
+  }
+
+  /** Values between those that are there: a part of the range is looked at more closely. */
+  private refine(): void {
+    const [low, high] = this.context.state.range!;
+    if (this.drawnFor === this.motionKey()) this.points.keepWithin(Math.min(low, high), Math.max(low, high));
+    else this.points.clear();
     void this.job.start((signal) => this.compute(signal));
   }
 
@@ -148,7 +157,6 @@ export class DiagramPanel implements Panel {
       this.picture.say("This model has no surface to look at. Choose a period.");
       return;
     }
-    this.points.clear();
     this.failed.clear();
     this.done = 0;
     this.drawnFor = this.motionKey();
@@ -185,6 +193,7 @@ export class DiagramPanel implements Panel {
     for (const part of chunks(evenly(state.range!, VALUES), CHUNK)) {
       const request = this.request(part, start);
       const found = toDiagramPart(await engines.many()[0].ask(request, signal));
+      signal.throwIfAborted();
       if (found.end && found.end.every(Number.isFinite)) start = [...found.end];
       this.take(found, request);
     }
@@ -228,14 +237,15 @@ export class DiagramPanel implements Panel {
     return null;
   }
 
-  private setWindow({ range, up }: Window): void {
+  private setWindow({ range, up }: Window, isPart = false): void {
     const { state } = this.context;
     if (range[0] === range[1]) return;
     state.range = [range[0], range[1]];
     this.up = up;
     for (const [k, label] of [this.low, this.high].entries()) label.querySelector("input")!.value = showPlain(range[k], range);
     this.back.hidden = this.earlier.length === 0;
-    this.begin();
+    if (isPart) this.refine();
+    else this.begin();
   }
 
   private zoomOut(): void {
@@ -301,10 +311,8 @@ export class DiagramPanel implements Panel {
     this.earlier.push({ range: state.range!, up: this.up });
     const sorted = (a: number, b: number): [number, number] => (a < b ? [a, b] : [b, a]);
     const isFlat = Math.abs(choice.y[1] - choice.y[0]) < 8;
-    this.setWindow({
-      range: sorted(frame.x.back(choice.x[0]), frame.x.back(choice.x[1])),
-      up: isFlat ? this.up : sorted(frame.y.back(choice.y[0]), frame.y.back(choice.y[1])),
-    });
+    const range = sorted(frame.x.back(choice.x[0]), frame.x.back(choice.x[1]));
+    this.setWindow({ range, up: isFlat ? this.up : sorted(frame.y.back(choice.y[0]), frame.y.back(choice.y[1])) }, true);
   }
 
   /** A click takes the value of the parameter over into the pictures above. */

@@ -1,7 +1,7 @@
 /** The table of switches: what the pictures show, as text. */
 
 import { showMode } from "./modes.ts";
-import { count, showBeside, showName, showNumber } from "./numbers.ts";
+import { count, showBeside, showExpression, showName, showNumber } from "./numbers.ts";
 import type { Run } from "./replies.ts";
 
 const ROWS_SHOWN = 100;
@@ -44,7 +44,7 @@ export function showSwitches(target: HTMLElement, run: Run, states: readonly str
     row.insertCell().textContent = words(entry.kind) + (entry.note ? `, ${entry.note}` : "");
     const surface = row.insertCell();
     surface.className = "name";
-    surface.textContent = entry.surfaces.map(showName).join(", ");
+    surface.textContent = entry.surfaces.map(showExpression).join(", ");
     row.insertCell().textContent = entry.from === entry.to ? showMode(entry.to) : `${showMode(entry.from)} → ${showMode(entry.to)}`;
     entry.y.forEach((value, i) => {
       const cell = row.insertCell();

@@ -10,7 +10,7 @@ import { showSwitches } from "./events.ts";
 import { curveCsv, save, switchesCsv, writePng, writeSvg } from "./export.ts";
 import { initialState, motionRequest, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
 import { Motion } from "./motion.ts";
-import { count, showName, showNumber } from "./numbers.ts";
+import { count, showExpression, showName, showNumber } from "./numbers.ts";
 import type { Context, Panel } from "./panel.ts";
 import { engineFor, type Engines } from "./pool.ts";
 import type { Run } from "./replies.ts";
@@ -154,7 +154,7 @@ export class Front {
       start: (y0) => {
         state.y0.splice(0, model.n, ...y0);
         this.showValues();
-        this.motion.update(true);
+        this.motion.startInWindow();
       },
       setParameter: (name, value) => {
         state.params[name] = value;
@@ -392,9 +392,9 @@ export class Front {
   private buildModel(): HTMLElement {
     const { model, host } = this;
     const rows: [string, string][] = [
-      ["States", model.states.join(", ")],
-      ["Parameters", model.params.map(({ name, value }) => `${name} = ${showNumber(value)}`).join(", ")],
-      ["Surfaces", model.surfaces.join(",  ")],
+      ["States", model.states.map(showName).join(",  ")],
+      ["Parameters", model.params.map(({ name, value }) => `${showName(name)} = ${showNumber(value)}`).join(",  ")],
+      ["Surfaces", model.surfaces.map(showExpression).join(",   ")],
       ["Actions", model.actions.join(", ")],
       ["Discrete states", model.discrete.join(", ")],
     ];

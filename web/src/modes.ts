@@ -1,6 +1,6 @@
 /** Modes as sign vectors, `+0-`: their order, their names, and their colours, which are the same in every run. */
 
-import { showName } from "./numbers.ts";
+import { showExpression } from "./numbers.ts";
 
 /** Rows of Pascal's triangle modulo `modulus`. */
 function binomials(n: number, modulus: number): number[][] {
@@ -63,7 +63,7 @@ export function showMode(mode: string): string {
   return mode === "" ? "smooth" : mode.replaceAll("-", "−");
 }
 
-const LONGEST_SURFACE = 14;
+const LONGEST_SURFACE = 24;
 
 /** The mode in words if there is one surface with a short name: `v > 0`. */
 export function explainMode(mode: string, surfaces: readonly string[]): string {
@@ -71,7 +71,7 @@ export function explainMode(mode: string, surfaces: readonly string[]): string {
     return isSliding(mode) ? `${showMode(mode)}  sliding` : showMode(mode);
   }
   const sign = { "+": ">", "-": "<", "0": "=" }[mode];
-  return `${showMode(mode)}  ${showName(surfaces[0])} ${sign} 0${mode === "0" ? ", sliding" : ""}`;
+  return `${showMode(mode)}  ${showExpression(surfaces[0])} ${sign} 0${mode === "0" ? ", sliding" : ""}`;
 }
 
 function countZeros(mode: string): number {

@@ -31,10 +31,8 @@ export interface MotionHooks {
   busy(isBusy: boolean): void;
 }
 
-interface Asked {
-  /** Whether the axes may be fitted afterwards. */
-  readonly mayFit: boolean;
-}
+/** What is fitted to the run when it has come. While something is dragged the axes hold. */
+type Fitted = "nothing" | "series" | "all";
 
 const MOST_PANELS = 4;
 const LONG = 250; // milliseconds
@@ -57,7 +55,7 @@ export class Motion {
   private time: Frame["x"] | null = null;
   private shown: number[];
   private stopper = new AbortController();
-  private readonly latest = new Latest<Asked>((asked) => this.compute(asked));
+  private readonly latest = new Latest<Fitted>((fitted) => this.compute(fitted));
   private readonly latestPlane = new Latest<null>(() => this.computePlane());
 
   constructor(
@@ -87,7 +85,12 @@ export class Motion {
 
   /** Compute again; while something is dragged the axes hold. */
   update(isDragging: boolean): void {
-    this.latest.ask({ mayFit: !isDragging });
+    this.latest.ask(isDragging ? "nothing" : "all");
+  }
+
+  /** Compute from a start that was chosen in the window of the portrait: the window stays. */
+  startInWindow(isDragging = false): void {
+    this.latest.ask(isDragging ? "nothing" : "series");
   }
 
   async settled(): Promise<void> {
@@ -135,7 +138,7 @@ export class Motion {
 
   keep(): void {
     this.state.kept = [...this.state.kept, [...this.state.y0]].slice(-MOST_KEPT);
-    this.update(true);
+    this.startInWindow();
   }
 
   clear(): void {
@@ -183,7 +186,7 @@ export class Motion {
     this.series.close();
   }
 
-  private async compute({ mayFit }: Asked): Promise<void> {
+  private async compute(fitted: Fitted): Promise<void> {
     const { signal } = this.stopper;
     const slow = setTimeout(() => this.hooks.busy(true), LONG);
     try {
@@ -194,7 +197,7 @@ export class Motion {
       this.kept = kept;
       if (run.t.length === 0) throw new Error(run.message || "The run has no points.");
       if (this.cursor !== null && stateAt(run, this.cursor) === null) this.cursor = null;
-      this.fitIfNeeded(run, mayFit);
+      this.fitIfNeeded(run, fitted);
       this.say(null);
       this.hooks.ran(run, null);
     } catch (error) {
@@ -240,14 +243,15 @@ export class Motion {
     this.hooks.axesChosen(this.state.axes);
   }
 
-  private fitIfNeeded(run: Run, mayFit: boolean): void {
+  private fitIfNeeded(run: Run, fitted: Fitted): void {
     this.chooseAxes(run);
     const { axes, box } = this.state;
     if (this.spans.length === 0) this.spans = spansOf(run);
     if (axes !== null && this.box === null) this.box = boxOf(run, axes);
-    if (!mayFit || box !== null) return;
-    if (axes !== null && this.box !== null && !fits(run, axes, this.box)) this.box = boxOf(run, axes);
+    if (fitted === "nothing") return;
     this.spans = spansOf(run);
+    if (fitted === "series" || box !== null) return;
+    if (axes !== null && this.box !== null && !fits(run, axes, this.box)) this.box = boxOf(run, axes);
   }
 
   private fitTo(run: Run): void {
@@ -297,7 +301,7 @@ export class Motion {
     };
   }
 
-  private startAt(values: readonly [number, number]): void {
+  private startAt(values: readonly [number, number], isDragging = false): void {
     const [i, j] = this.state.axes!;
     const digits = (value: number, [low, high]: Interval) => {
       const step = 10 ** Math.floor(Math.log10((high - low) / 1000));
@@ -307,8 +311,7 @@ export class Motion {
     this.state.y0[i] = digits(values[0], x);
     this.state.y0[j] = digits(values[1], y);
     this.hooks.started();
-    // a click chooses a place in this window: the window stays
-    this.update(true);
+    this.startInWindow(isDragging);
   }
 
   private listenPortrait(picture: Picture): void {
@@ -321,7 +324,7 @@ export class Motion {
       const { x, y } = picture.place(event);
       const within = (place: number, [a, b]: Interval) => place >= Math.min(a, b) && place <= Math.max(a, b);
       if (!within(x, frame.x.places) || !within(y, frame.y.places)) return;
-      this.startAt([frame.x.back(x), frame.y.back(y)]);
+      this.startAt([frame.x.back(x), frame.y.back(y)], isPressed);
     };
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0 || event.pointerType === "touch") return;
@@ -332,8 +335,12 @@ export class Motion {
     canvas.addEventListener("pointermove", (event) => {
       if (isPressed) start(event);
     });
-    canvas.addEventListener("pointerup", () => (isPressed = false));
-    canvas.addEventListener("pointercancel", () => (isPressed = false));
+    const release = () => {
+      if (isPressed) this.startInWindow();
+      isPressed = false;
+    };
+    canvas.addEventListener("pointerup", release);
+    canvas.addEventListener("pointercancel", release);
     // a finger that moves scrolls the page; one that taps starts a trajectory
     canvas.addEventListener("click", (event) => {
       if ((event as PointerEvent).pointerType === "touch") start(event as PointerEvent);

@@ -35,7 +35,7 @@ export function count(n: number, one: string, many = `${one}s`): string {
 
 const GREEK: Readonly<Record<string, string>> = {
   alpha: "α", beta: "β", gamma: "γ", delta: "δ", epsilon: "ε", eps: "ε", zeta: "ζ", eta: "η", theta: "θ", kappa: "κ",
-  lam: "λ", mu: "μ", nu: "ν", xi: "ξ", rho: "ρ", sigma: "σ", tau: "τ", phi: "φ", chi: "χ", psi: "ψ", omega: "ω",
+  lam: "λ", pi: "π", mu: "μ", nu: "ν", xi: "ξ", rho: "ρ", sigma: "σ", tau: "τ", phi: "φ", chi: "χ", psi: "ψ", omega: "ω",
   Gamma: "Γ", Delta: "Δ", Theta: "Θ", Lambda: "Λ", Sigma: "Σ", Phi: "Φ", Psi: "Ψ", Omega: "Ω",
 };
 const BELOW = "₀₁₂₃₄₅₆₇₈₉";
@@ -46,4 +46,14 @@ export function showName(name: string): string {
   if (plain === null) return name;
   const [, letters, digits] = plain;
   return (GREEK[letters] ?? letters) + [...digits].map((digit) => BELOW[Number(digit)]).join("");
+}
+
+/** A printed expression as a text has it: `S - 0.8*T - eps` is S − 0.8 T − ε. */
+export function showExpression(text: string): string {
+  return text
+    .replace(/[A-Za-z_]\w*(?:\[\d+\])?/g, showName)
+    .replaceAll("**2", "²")
+    .replaceAll("**3", "³")
+    .replace(/(?<!\*)\*(?!\*)/g, "\u2009")
+    .replaceAll("-", MINUS);
 }

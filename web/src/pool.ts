@@ -129,8 +129,10 @@ export async function askAll(
   const work = async (engine: Engine) => {
     try {
       for (let next = source.next(); !next.done && !hasFailed; next = source.next()) {
-        take(await engine.ask(next.value, signal), next.value);
+        const reply = await engine.ask(next.value, signal);
         signal?.throwIfAborted();
+        take(reply, next.value);
+        await new Promise((go) => setTimeout(go)); // an engine in the page's own thread leaves time to draw
       }
     } catch (error) {
       hasFailed = true;

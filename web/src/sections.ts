@@ -2,7 +2,7 @@
 
 import { make, select } from "./dom.ts";
 import { labelled, numberField } from "./controls.ts";
-import { showName } from "./numbers.ts";
+import { showExpression, showName } from "./numbers.ts";
 import { frequencyOf, type Description, type Section, type State } from "./model.ts";
 
 /** The fields of a section; `changed` is called after each change. */
@@ -40,7 +40,7 @@ interface Option {
 function optionsOf(model: Description): Option[] {
   const options: Option[] = model.surfaces.map((surface) => ({
     key: `surface ${surface}`,
-    label: `${showName(surface)} = 0`,
+    label: `${showExpression(surface)} = 0`,
     section: { by: "surface", surface },
   }));
   const frequency = frequencyOf(model);
@@ -59,7 +59,7 @@ function keyOf(section: Section | null): string {
 export function showSection(section: Section | null): string {
   switch (section?.by) {
     case "surface":
-      return `at ${showName(section.surface)} = 0`;
+      return `at ${showExpression(section.surface)} = 0`;
     case "forcing":
       return `each 2π/${showName(section.frequency)}`;
     case "period":

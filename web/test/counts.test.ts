@@ -16,6 +16,8 @@ test("points that are added stay, however many there are", () => {
   for (let k = 0; k < 5000; k += 5) points.add([k, k + 1, k + 2, k + 3, k + 4], [0, 0, 0, 0, k]);
   assert.equal(points.length, 5000);
   assert.ok(points.x.every((value, k) => value === k));
+  points.keepWithin(100, 199);
+  assert.deepEqual([points.length, points.x[0], points.x[99]], [100, 100, 199]);
   points.clear();
   assert.equal(points.x.length, 0);
 });

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { readNumber, sliderStep } from "../src/controls.ts";
-import { showBeside, showName, showNumber } from "../src/numbers.ts";
+import { showBeside, showExpression, showName, showNumber } from "../src/numbers.ts";
 
 test("numbers as they are typed", () => {
   for (const [text, value] of [["1/3", 1 / 3], ["-2,5", -2.5], ["−4", -4], ["2 pi", 2 * Math.PI], ["pi/2", Math.PI / 2], ["60π", 60 * Math.PI], ["1e-3", 1e-3], [".5", 0.5], ["+7", 7]] as const) {
@@ -33,4 +33,10 @@ test("names as they are printed", () => {
   assert.equal(showName("x[0] - y"), "x[0] - y");
   assert.equal(showName("x]"), "x]");
   assert.equal(showName("F_s"), "F_s");
+});
+
+test("expressions as they are printed", () => {
+  assert.equal(showExpression("S - 0.8*T - eps"), "S − 0.8\u2009T − ε");
+  assert.equal(showExpression("x[1]**2 + sin(omega*t)"), "x₁² + sin(ω\u2009t)");
+  assert.equal(showExpression("x**5"), "x**5");
 });
