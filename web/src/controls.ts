@@ -110,6 +110,7 @@ export function numberField(
   value: number,
   take: (value: number) => void,
   accept: (value: number) => boolean = () => true,
+  title = "",
 ): HTMLLabelElement {
   const field = make("input", { type: "text", inputmode: "decimal", value: plainNumber(value), autocomplete: "off" });
   field.addEventListener("change", () => {
@@ -118,7 +119,7 @@ export function numberField(
     field.toggleAttribute("aria-invalid", !isGood);
     if (isGood) take(read);
   });
-  return make("label", { class: "field" }, make("span", {}, label), field);
+  return make("label", { class: "field", ...(title ? { title } : {}) }, make("span", {}, label), field);
 }
 
 export function labelled(label: string, control: HTMLElement): HTMLLabelElement {

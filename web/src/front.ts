@@ -29,6 +29,8 @@ export interface Host {
   readonly problems: readonly { readonly name: string; readonly title: string }[];
   /** The address that a link is added to; `null` if links make no sense here. */
   readonly address: string | null;
+  /** Whether the host is dark; by default as the system says. */
+  readonly dark?: boolean;
   openProblem?(name: string): void;
   openModel?(model: Uint8Array, text: string): void;
   reader(): Promise<TextReader | null>;
@@ -73,7 +75,7 @@ export class Front {
     private readonly state: State,
     private readonly host: Host,
   ) {
-    this.theme = this.scheme.matches ? DARK : LIGHT;
+    this.theme = (host.dark ?? this.scheme.matches) ? DARK : LIGHT;
     this.motion = new Motion(model, state, engines.quick, {
       theme: () => this.theme,
       ran: (run, words) => this.ran(run, words),
@@ -93,7 +95,7 @@ export class Front {
     this.build();
     this.applyTheme();
     const follow = () => {
-      if (this.hasChosenTheme) return;
+      if (this.hasChosenTheme || host.dark !== undefined) return;
       this.theme = this.scheme.matches ? DARK : LIGHT;
       this.applyTheme();
     };
@@ -108,6 +110,12 @@ export class Front {
     await this.motion.settled();
     for (const panel of this.panels.values()) await panel.settled();
     await new Promise((resolve) => requestAnimationFrame(() => resolve(null)));
+  }
+
+  /** A title for the window. */
+  get title(): string {
+    const name = this.host.problem?.replaceAll("_", " ") ?? this.model.page.title;
+    return name ? `${name} · filippov` : "filippov";
   }
 
   /** The run on the screen. */

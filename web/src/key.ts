@@ -1,5 +1,7 @@
 /** The key below a picture: samples of what is drawn, with names. */
 
+import { explainMode, isSliding, modeColour } from "./modes.ts";
+import { count } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import { SLIDING_WIDTH, SMOOTH_WIDTH, type Theme } from "./theme.ts";
 
@@ -61,7 +63,7 @@ export function lineEntry(label: string, colour: string, width: number, dash: nu
   };
 }
 
-export function modeEntry(label: string, colour: string, slides: boolean): KeyEntry {
+function modeEntry(label: string, colour: string, slides: boolean): KeyEntry {
   return lineEntry(label, colour, slides ? SLIDING_WIDTH + 0.6 : SMOOTH_WIDTH + 0.5);
 }
 
@@ -74,4 +76,20 @@ export function dotEntry(label: string, colour: string): KeyEntry {
       pen.fill();
     },
   };
+}
+
+/** Words without a sample: what the key leaves out. */
+export function wordsEntry(label: string): KeyEntry {
+  return { label, sample: () => undefined };
+}
+
+const MOST_MODES_NAMED = 8;
+
+/** The modes of a run, not more of them than a reader takes in. */
+export function modeEntries(modes: readonly string[], surfaces: readonly string[], theme: Theme): KeyEntry[] {
+  const entries = modes
+    .slice(0, MOST_MODES_NAMED)
+    .map((mode) => modeEntry(explainMode(mode, surfaces), modeColour(mode, theme.colours), isSliding(mode)));
+  const left = modes.length - MOST_MODES_NAMED;
+  return left > 0 ? [...entries, wordsEntry(`and ${count(left, "more mode")}`)] : entries;
 }

@@ -52,6 +52,7 @@ export async function boot(element: HTMLElement): Promise<void> {
       const made = await fromAddress(element, home, (again) => void again().catch((error) => complain(element, error)));
       front?.close();
       front = made();
+      document.title = front.title;
       Object.assign(element, { front });
     } catch (error) {
       front?.close();
@@ -185,6 +186,7 @@ async function render({ model: widget, el }: { model: WidgetModel; el: HTMLEleme
       state: values(),
       host: {
         bytes,
+        dark: isDarkNotebook(),
         changed(state: State) {
           const now = { params: { ...state.params }, y0: [...state.y0], t_span: [...state.t_span] };
           const text = JSON.stringify(now);
@@ -213,6 +215,18 @@ async function render({ model: widget, el }: { model: WidgetModel; el: HTMLEleme
     complain(element, error);
     return () => undefined;
   }
+}
+
+/** What the notebook says of its colours: JupyterLab, VS Code, marimo; `undefined` if it says nothing. */
+function isDarkNotebook(): boolean | undefined {
+  const { body, documentElement } = document;
+  if (body.dataset.jpThemeLight !== undefined) return body.dataset.jpThemeLight === "false";
+  if (body.dataset.vscodeThemeKind !== undefined) return body.dataset.vscodeThemeKind !== "vscode-light";
+  for (const { classList } of [body, documentElement]) {
+    if (classList.contains("dark")) return true;
+    if (classList.contains("light")) return false;
+  }
+  return undefined;
 }
 
 async function widgetEngine(widget: WidgetModel, bytes: Uint8Array | null): Promise<Engine | Engines> {

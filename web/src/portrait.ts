@@ -2,8 +2,8 @@
 
 import { clipTo, drawAxes, frameIn, padded, type Frame, type Interval } from "./axes.ts";
 import { boundsOf, coordinate, dwellRadius, findDwells, findJumps, modesOf, tracePiece } from "./curves.ts";
-import { dotEntry, drawKey, layKey, lineEntry, modeEntry, SAMPLE, type KeyEntry } from "./key.ts";
-import { explainMode, isSliding, modeColour } from "./modes.ts";
+import { dotEntry, drawKey, layKey, lineEntry, modeEntries, SAMPLE, type KeyEntry } from "./key.ts";
+import { isSliding, modeColour } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, type Pen } from "./pen.ts";
 import type { Equilibrium, Plane, Run, SurfaceKind } from "./replies.ts";
@@ -33,7 +33,6 @@ export interface PortraitData {
 const SIDES = { left: 58, right: 16, top: 30 };
 const BELOW_AXIS = 46;
 const ARROW = 9;
-const MOST_MODES_NAMED = 8;
 const CYCLE_WIDTH = 2.4;
 
 /** Draw the portrait; the frame is what a pointer needs. */
@@ -233,11 +232,7 @@ function drawMark(pen: Pen, x: number, y: number, theme: Theme): void {
 function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
   const entries: KeyEntry[] = [];
   const { plane, run } = data;
-  if (data.withModes && run) {
-    for (const mode of modesOf(run).slice(0, MOST_MODES_NAMED)) {
-      entries.push(modeEntry(explainMode(mode, data.surfaces), modeColour(mode, theme.colours), isSliding(mode)));
-    }
-  }
+  if (data.withModes && run) entries.push(...modeEntries(modesOf(run), data.surfaces, theme));
   const kinds = new Set(plane?.parts.map((part) => part.kind));
   for (const [kind, line] of Object.entries(SURFACE_LINES) as [SurfaceKind, SurfaceLine][]) {
     if (kinds.has(kind)) entries.push(lineEntry(line.label, line.colour(theme), line.width, line.dash));

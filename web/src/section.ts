@@ -49,8 +49,8 @@ export class SectionPanel implements Panel {
         "form",
         { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
         sectionFields(model, state, update),
-        numberField("leave out", state.skip, (value) => ((state.skip = Math.round(value)), update()), (value) => value >= 0),
-        numberField("points", state.count, (value) => ((state.count = Math.round(value)), update()), (value) => value >= 1),
+        numberField("transient", state.skip, (value) => ((state.skip = Math.round(value)), update()), (value) => value >= 0, "returns left out at the start"),
+        numberField("points", state.count, (value) => ((state.count = Math.round(value)), update()), (value) => value >= 1, "returns that are drawn"),
         labelled("across", axis(0)),
         labelled("up", axis(1)),
       ),
@@ -132,7 +132,7 @@ export class SectionPanel implements Panel {
         Float64Array.from({ length: found.t.length }, (_, k) => (which === RETURN ? k + 1 : found.y[k * found.n + which]));
       points.add(column(this.axes[0]), column(this.axes[1]));
       const { state } = this.context;
-      this.words.textContent = `${count(found.t.length, "return")} ${showSection(state.section)}, after ${state.skip} left out`;
+      this.words.textContent = `${count(found.t.length, "return")} ${showSection(state.section)}, after a transient of ${state.skip}`;
     }
     this.picture.redraw();
   }
@@ -158,6 +158,6 @@ export class SectionPanel implements Panel {
 }
 
 function noReturns({ success, message }: Returns): string {
-  const words = "The motion has no more than the left out returns to this section.";
+  const words = "The motion has no returns to this section after the transient.";
   return success ? words : `${words} ${message}`;
 }

@@ -2,8 +2,8 @@
 
 import { clipTo, crisp, drawAxes, linear, padded, ticksOf, type Frame, type Interval } from "./axes.ts";
 import { boundsOf, findJumps, modesOf, TIME, tracePiece } from "./curves.ts";
-import { drawKey, layKey, modeEntry } from "./key.ts";
-import { explainMode, isSliding, modeColour } from "./modes.ts";
+import { drawKey, layKey, modeEntries } from "./key.ts";
+import { isSliding } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import type { Run } from "./replies.ts";
@@ -29,17 +29,13 @@ const GAP = 34;
 const ABOVE_STRIP = 30;
 const BELOW_STRIP = 44;
 const CLOSEST_LINES = 6;
-const MOST_MODES_NAMED = 8;
 
 /** Draw the panels; the scale of time is what a pointer needs. */
 export function drawSeries(pen: Pen, width: number, height: number, data: SeriesData, theme: Theme): Frame["x"] {
   const { run, shown } = data;
   const time = linear(data.window, [LEFT, Math.max(LEFT + 10, width - RIGHT)]);
   if (!run) return time;
-  const modes = modesOf(run);
-  const entries = modes
-    .slice(0, MOST_MODES_NAMED)
-    .map((mode) => modeEntry(explainMode(mode, data.surfaces), modeColour(mode, theme.colours), isSliding(mode)));
+  const entries = modeEntries(modesOf(run), data.surfaces, theme);
   const key = layKey(pen, entries, width - LEFT - RIGHT);
   const floor = height - key.height - BELOW_STRIP - STRIP_HEIGHT - ABOVE_STRIP;
   const each = (floor - 4) / shown.length;
