@@ -17,9 +17,9 @@ export class CyclesPanel implements Panel {
   private readonly picture: Picture;
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly branchWords = make("p", { class: "quiet", role: "status" });
-  private readonly multipliers = make("p", { class: "quiet" });
-  private readonly go = button("Find the cycle that this run leads to", () => this.press(() => this.find()));
-  private readonly follow = button("Follow", () => this.press(() => this.continue()));
+  private readonly multipliers = make("p", { class: "row quiet" });
+  private readonly go = button("Find the cycle that this run leads to", () => this.press(this.go, (signal) => this.find(signal)));
+  private readonly follow = button("Follow", () => this.press(this.follow, (signal) => this.continue(signal)));
   private readonly job = new Job();
   private branch: Branch | null = null;
   private of: "cycle" | "equilibrium" = "cycle";
@@ -118,12 +118,18 @@ export class CyclesPanel implements Panel {
     ];
   }
 
-  private press(work: () => Promise<void>): void {
-    if (this.job.isRunning) this.job.stop();
-    else void this.job.start(() => work());
+  /** Start the work of a button, or stop what runs. */
+  private press(by: HTMLButtonElement, work: (signal: AbortSignal) => Promise<void>): void {
+    if (this.job.isRunning) {
+      this.job.stop();
+      return;
+    }
+    const words = by.textContent;
+    by.textContent = "Stop";
+    void this.job.start(work).finally(() => (by.textContent = words));
   }
 
-  private async find(): Promise<void> {
+  private async find(signal: AbortSignal): Promise<void> {
     const { state, engines } = this.context;
     const engine = engineFor(engines, "cycle");
     if (engine === null) return;
@@ -131,7 +137,7 @@ export class CyclesPanel implements Panel {
     try {
       const section = state.section === null ? {} : { section: sectionRequest(state.section, state.params) };
       const request = { kind: "cycle", ...motionRequest(state), y0: this.context.end() ?? state.y0, ...section };
-      const cycle = toCycle(await engine.ask(request));
+      const cycle = toCycle(await engine.ask(request, signal));
       this.start = [...cycle.run.y.subarray(0, cycle.run.n)];
       this.foundFor = this.motionKey();
       this.context.showCycle(cycle.run);
@@ -142,7 +148,7 @@ export class CyclesPanel implements Panel {
     }
   }
 
-  private async continue(): Promise<void> {
+  private async continue(signal: AbortSignal): Promise<void> {
     const { state, engines } = this.context;
     const engine = engineFor(engines, "continuation");
     if (engine === null) return;
@@ -151,8 +157,9 @@ export class CyclesPanel implements Panel {
       const { parameter, range } = state;
       const y0 = this.start ?? this.context.end() ?? state.y0;
       const request = { kind: "continuation", ...motionRequest(state), y0, parameter, range, of: this.of };
-      this.branch = toBranch(await engine.ask(request));
-      this.branchWords.textContent = this.branch.text;
+      this.branch = toBranch(await engine.ask(request, signal));
+      const special = this.branch.special.map(({ code, value, text }) => `${code} at ${showName(this.branch!.parameter)} = ${showNumber(value, 5)}, ${text}`);
+      this.branchWords.textContent = [this.branch.text, ...special].join(" · ");
       this.picture.say(this.branch.value.length === 0 ? "The branch has no points." : null);
     } catch (error) {
       this.branch = null;
