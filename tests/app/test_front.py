@@ -255,6 +255,13 @@ def test_a_run_that_fails_is_told_where_the_picture_would_be(open_page: Any) -> 
     settle(page)
     assert "method" in page.locator(".portrait .words").inner_text()
     assert "method" in page.locator(".series .words").inner_text()
+    assert page.locator(".switches tbody tr").count() == 0, "the switches of the run before are gone"
+    page.get_by_role("group").filter(has_text="Accuracy").locator("summary").click()
+    for method in page.locator("select[aria-label=method] option").all_inner_texts():
+        if method != "no such method":
+            page.get_by_label("method", exact=True).last.select_option(method)
+            settle(page)
+            assert front(page, "run.switches.length") > 30, method
 
 
 def test_the_page_works_without_workers(open_page: Any) -> None:

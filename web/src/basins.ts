@@ -1,13 +1,13 @@
 /** The basins of attraction over the window of the portrait: coarse at once, then finer. */
 
 import type { Frame } from "./axes.ts";
-import { describeBasins, drawBasins, type BasinsData } from "./cells.ts";
+import { describeBasins, drawBasins, endName, type BasinsData } from "./cells.ts";
 import { numberField } from "./controls.ts";
 import { button, make } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
 import { motionRequest } from "./model.ts";
-import { count } from "./numbers.ts";
+import { count, showExpression } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import type { Box } from "./portrait.ts";
@@ -24,6 +24,8 @@ export class BasinsPanel implements Panel {
   private box: Box;
   private cells = 128;
   private frame: Frame | null = null;
+  /** What the letters of the key mean. */
+  private readonly ends = make("ul", { class: "ends" });
   private readonly job = new Job();
   private drawnFor = "";
 
@@ -45,6 +47,7 @@ export class BasinsPanel implements Panel {
       ),
       make("div", { class: "row" }, this.go, this.words),
       this.picture.element,
+      this.ends,
     );
     this.picture.canvas.addEventListener("click", (event) => {
       const { frame } = this;
@@ -135,6 +138,7 @@ export class BasinsPanel implements Panel {
         const found = toBasins(await engines.many()[0].ask(request, signal));
         signal.throwIfAborted();
         this.basins = found;
+        this.ends.replaceChildren(...found.labels.map((label, k) => make("li", {}, make("b", {}, endName(k)), showExpression(label))));
         this.words.textContent = `${size} by ${size} cells · ${count(this.basins.labels.length, "end")} · click to start there`;
         this.picture.redraw();
         if (size === this.cells) break;

@@ -17,7 +17,7 @@ export interface BasinsData {
 
 const SIDES = { left: 58, right: 16, top: 30 };
 const BELOW_AXIS = 46;
-const MOST_NAMED = 6;
+const MOST_NAMED = 8;
 
 export function drawBasins(pen: Pen, width: number, height: number, data: BasinsData, theme: Theme): Frame {
   const { basins } = data;
@@ -56,6 +56,16 @@ export function colourCells({ rows, columns, label }: Basins, theme: Theme): Ras
   return { width: columns, height: rows, pixels };
 }
 
+/** A letter for each end; after Z numbers follow. */
+export function endName(k: number): string {
+  return k < 26 ? String.fromCharCode(65 + k) : String(k + 1);
+}
+
+/** The share of the cells that go to an end, in percent. */
+export function shareOf({ label }: Basins, k: number): number {
+  return Math.round((100 * label.reduce((sum, cell) => sum + (cell === k ? 1 : 0), 0)) / label.length);
+}
+
 function keyEntries(basins: Basins, theme: Theme): KeyEntry[] {
   const square = (label: string, colour: string): KeyEntry => ({
     label,
@@ -64,20 +74,18 @@ function keyEntries(basins: Basins, theme: Theme): KeyEntry[] {
       pen.fillRect(x + 3, y - 6, 12, 12);
     },
   });
-  const entries = basins.labels.slice(0, MOST_NAMED).map((label, k) => square(label, basinColour(k, theme)));
+  const entries = basins.labels
+    .slice(0, MOST_NAMED)
+    .map((_, k) => square(`${endName(k)}, ${shareOf(basins, k)} %`, basinColour(k, theme)));
   if (basins.labels.length > MOST_NAMED) entries.push(square(`${basins.labels.length - MOST_NAMED} more`, theme.muted));
   if (basins.label.some((cell) => cell < 0)) entries.push(square("no end within the time", theme.faint));
   return entries;
 }
 
-/** The share of the plane that goes to each end, for the sentence. */
+/** The picture in a sentence. */
 export function describeBasins(data: BasinsData): string {
   const { basins } = data;
   if (!basins) return "Basins: not computed yet.";
-  const shares = basins.labels.map((label, k) => {
-    const cells = basins.label.reduce((sum, cell) => sum + (cell === k ? 1 : 0), 0);
-    return `${label}: ${Math.round((100 * cells) / basins.label.length)} %`;
-  });
+  const shares = basins.labels.map((label, k) => `${endName(k)}, ${label}: ${shareOf(basins, k)} %`);
   return `Basins over ${data.labels.join(" and ")}, ${basins.columns} by ${basins.rows} cells. ${shares.join("; ")}.`;
 }
-

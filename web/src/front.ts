@@ -46,7 +46,7 @@ const PLACE_NAMES: Record<Place, string> = {
   cycles: "Cycles",
   model: "Model",
 };
-const METHODS = ["auto", "taylor", "dop853", "rodas5p", "midpoint"];
+const METHODS = ["auto", "DOPRI5", "DOP853", "Taylor", "Midpoint", "Rodas5P"];
 const MANY_STATES = 6;
 
 export class Front {
@@ -449,9 +449,11 @@ export class Front {
   }
 
   private ran(run: Run | null, words: string | null): void {
-    this.status.classList.toggle("wrong", run === null ? words !== "stopped" : !run.success);
-    if (run === null) this.status.textContent = words ?? "";
-    else {
+    this.status.classList.toggle("wrong", run !== null && !run.success);
+    if (run === null) {
+      this.status.textContent = words === null ? "stopped" : ""; // words stand where the pictures were
+      if (words !== null) this.switches.replaceChildren(make("p", { class: "quiet" }, "There is no run to list switches of."));
+    } else {
       this.status.textContent = describeRun(run);
       this.status.title = run.warnings.map(({ message }) => message).join("\n");
       showSwitches(this.switches, run, this.model.states, (t) => this.motion.mark(t));

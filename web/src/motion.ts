@@ -17,7 +17,7 @@ import type { Theme } from "./theme.ts";
 
 export interface MotionHooks {
   theme(): Theme;
-  /** A run has come, or it failed with words. */
+  /** A run has come, or it failed with words; both are `null` if it was stopped. */
   ran(run: Run | null, words: string | null): void;
   /** The plane of the portrait has come, or it failed with words. */
   planed(words: string | null): void;
@@ -206,7 +206,7 @@ export class Motion {
         this.run = null;
         this.say(words ?? "The computation was stopped. Move a slider to start another one.");
       }
-      this.hooks.ran(null, words ?? "stopped");
+      this.hooks.ran(null, words);
     } finally {
       clearTimeout(slow);
       this.hooks.busy(false);

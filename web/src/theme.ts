@@ -60,6 +60,7 @@ export function applyTheme(element: HTMLElement, theme: Theme): void {
   for (const name of ["ground", "raised", "ink", "muted", "faint", "hair", "accent"] as const) {
     element.style.setProperty(`--${name}`, theme[name]);
   }
+  element.style.setProperty("--wrong", theme.repelling);
   element.style.setProperty("--sans", SANS);
   element.style.setProperty("--serif", SERIF);
   element.style.colorScheme = theme.name;
