@@ -412,3 +412,18 @@ def test_the_built_files_are_of_the_size_that_is_promised() -> None:
 
 def test_the_model_in_a_link_is_small(site: str) -> None:
     assert len(model_bytes("dry_friction")) < 1000
+
+
+def test_a_field_that_depends_on_time_is_that_of_the_marked_instant(open_page: Any) -> None:
+    page = open_page("#p=dry_friction")
+    assert front(page, "motion.plane.instant") == 0
+    ends = "motion.plane.points.slice()"
+    before = front(page, ends)
+    page.locator(".series canvas").hover(position={"x": 300, "y": 100})
+    settle(page)
+    assert front(page, "motion.plane.instant") > 50
+    assert front(page, ends) != before, "where the surface attracts has moved"
+    page.mouse.move(5, 5)
+    settle(page)
+    assert front(page, "motion.plane.instant") == 0
+    assert front(page, ends) == before

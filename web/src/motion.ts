@@ -147,9 +147,10 @@ export class Motion {
     this.portrait?.redraw();
   }
 
-  /** Mark an instant in both pictures. */
+  /** Mark an instant in both pictures; a field that depends on the time is that of the instant. */
   mark(t: number | null): void {
     this.cursor = t;
+    if (this.plane !== null && this.plane.instant !== null) this.latestPlane.ask(null);
     const at = t !== null && this.run ? stateAt(this.run, t) : null;
     if (at === null) this.hooks.read("");
     else {
@@ -223,8 +224,9 @@ export class Motion {
     const arrows = Math.min(MOST_ARROWS, Math.max(FEWEST_ARROWS, Math.round(size / PIXELS_PER_ARROW)));
     try {
       const box = [...x, ...y];
-      const request = { kind: "portrait", t: t_span[0], params, axes, box, rest: y0, cells: CELLS, arrows };
-      this.plane = toPlane(await this.engine.ask(request, this.stopper.signal));
+      const t = this.cursor ?? t_span[0];
+      const request = { kind: "portrait", t, params, axes, box, rest: y0, cells: CELLS, arrows };
+      this.plane = toPlane(await this.engine.ask(request, this.stopper.signal), t);
       this.hooks.planed(null);
     } catch (error) {
       this.plane = null; // the trajectory stands without the plane

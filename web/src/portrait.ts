@@ -5,7 +5,7 @@ import { boundsOf, coordinate, dwellRadius, findDwells, findJumps, modesOf, trac
 import { dotEntry, drawKey, layKey, lineEntry, modeEntries, SAMPLE, type KeyEntry } from "./key.ts";
 import { isSliding, modeColour } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
-import { circle, type Pen } from "./pen.ts";
+import { circle, setFont, type Pen } from "./pen.ts";
 import type { Equilibrium, Plane, Run, SurfaceKind } from "./replies.ts";
 import { SLIDING_WIDTH, SMOOTH_WIDTH, type Theme } from "./theme.ts";
 
@@ -44,6 +44,7 @@ export function drawPortrait(pen: Pen, width: number, height: number, data: Port
   const [i, j] = data.axes;
   drawAxes(pen, frame, { xLabel: data.states[i], yLabel: data.states[j] }, theme);
   pen.save();
+  if (data.plane && data.plane.instant !== null) drawInstant(pen, data.plane.instant, frame, theme);
   clipTo(pen, frame);
   pen.lineJoin = "round";
   if (data.plane) {
@@ -126,6 +127,15 @@ function drawCycle(pen: Pen, run: Run, [i, j]: readonly [number, number], frame:
 
 function cycleColour(theme: Theme): string {
   return theme.colours[5];
+}
+
+/** At which time the field is as it is drawn. */
+function drawInstant(pen: Pen, t: number, frame: Frame, theme: Theme): void {
+  setFont(pen, 12);
+  pen.fillStyle = theme.muted;
+  pen.textAlign = "right";
+  pen.textBaseline = "alphabetic";
+  pen.fillText(`field at t = ${showNumber(t, 4)}`, frame.x.places[1], frame.y.places[1] - 10);
 }
 
 function drawField(pen: Pen, { field }: Plane, frame: Frame, theme: Theme): void {

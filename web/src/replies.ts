@@ -64,8 +64,8 @@ export interface Plane {
   readonly points: Float64Array;
   readonly field: Float64Array;
   readonly equilibria: readonly Equilibrium[];
-  /** Why there are no equilibria, if that has a reason. */
-  readonly note: string;
+  /** The time of the field, if the field depends on it; such a plane has no equilibria. */
+  readonly instant: number | null;
 }
 
 /** Returns to a section: `y` holds rows of `n` states. */
@@ -132,14 +132,15 @@ export function toRun(reply: Reply): Run {
   };
 }
 
-export function toPlane(reply: Reply): Plane {
+/** `t` is the time that was asked for. */
+export function toPlane(reply: Reply, t: number): Plane {
   const header = reply.header;
   return {
     parts: (header.parts ?? []) as SurfacePart[],
     points: reply.table("points").data,
     field: reply.table("field").data,
     equilibria: (header.equilibria ?? []) as Equilibrium[],
-    note: String(header.note ?? ""),
+    instant: header.note ? t : null, // the note says that the field depends on the time
   };
 }
 

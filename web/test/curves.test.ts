@@ -70,7 +70,7 @@ function portraitData(): PortraitData {
         { y: [1.4, 0], surfaces: ["v"], stable: true, admissible: true },
         { y: [1.9, 0.7], surfaces: [], stable: true, admissible: false },
       ],
-      note: "",
+      instant: null,
     },
     axes: [0, 1],
     box: boxOf(run, [0, 1]),

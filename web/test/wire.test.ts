@@ -50,9 +50,10 @@ test("a run has its curve in pieces and its switches", () => {
 
 test("planes, diagrams and basins", () => {
   const parts = [{ surface: "v", kind: "attracting", first: 0, last: 1 }];
-  const plane = toPlane(readReply(packReply({ ok: true, parts, note: "forced" }, { points: table([[0, 0], [1, 0]]), field: table([[0, 1, 2, 3]]) })));
+  const plane = toPlane(readReply(packReply({ ok: true, parts, note: "forced" }, { points: table([[0, 0], [1, 0]]), field: table([[0, 1, 2, 3]]) })), 7);
   assert.equal(plane.parts[0].kind, "attracting");
   assert.deepEqual(plane.equilibria, []);
+  assert.equal(plane.instant, 7, "a field that depends on the time has its time");
   const header = { ok: true, messages: [{ value: 2, message: "too many steps" }] };
   const part = toDiagramPart(readReply(packReply(header, { value: column([1, 1]), y: column([3, 4]), end: column([3, 4]) })));
   assert.deepEqual(part.end, [3, 4]);
