@@ -36,7 +36,9 @@ async function page() {
 
 async function tests() {
   const folder = join(here, "test");
-  const entryPoints = (await readdir(folder)).filter((name) => name.endsWith(".test.ts")).map((name) => join(folder, name));
+  const entryPoints = (await readdir(folder))
+    .filter((name) => name.endsWith(".test.ts"))
+    .map((name) => join(folder, name));
   await build({
     ...common,
     entryPoints,

@@ -43,7 +43,12 @@ export class BasinsPanel implements Panel {
       make(
         "form",
         { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
-        numberField("cells each way", this.cells, (value) => ((this.cells = Math.round(value)), this.begin()), (value) => value >= 4 && value <= 1024),
+        numberField(
+          "cells each way",
+          this.cells,
+          (value) => ((this.cells = Math.round(value)), this.begin()),
+          (value) => value >= 4 && value <= 1024,
+        ),
       ),
       make("div", { class: "row" }, this.go, this.words),
       this.picture.element,
@@ -89,7 +94,9 @@ export class BasinsPanel implements Panel {
   saveables(): Saveable[] {
     if (!this.basins) return [];
     const { width, height } = this.picture;
-    return [{ name: "basins", width, height, draw: (pen, w, h, theme) => void drawBasins(pen, w, h, this.data(), theme) }];
+    return [
+      { name: "basins", width, height, draw: (pen, w, h, theme) => void drawBasins(pen, w, h, this.data(), theme) },
+    ];
   }
 
   numbers(): NumbersFile[] {
@@ -138,7 +145,9 @@ export class BasinsPanel implements Panel {
         const found = toBasins(await engines.many()[0].ask(request, signal));
         signal.throwIfAborted();
         this.basins = found;
-        this.ends.replaceChildren(...found.labels.map((label, k) => make("li", {}, make("b", {}, endName(k)), showExpression(label))));
+        this.ends.replaceChildren(
+          ...found.labels.map((label, k) => make("li", {}, make("b", {}, endName(k)), showExpression(label))),
+        );
         this.words.textContent = `${size} by ${size} cells · ${count(this.basins.labels.length, "end")} · click to start there`;
         this.picture.redraw();
         if (size === this.cells) break;
@@ -156,7 +165,12 @@ export class BasinsPanel implements Panel {
   private data(): BasinsData {
     const { model, state } = this.context;
     const [i, j] = state.axes ?? [0, 0];
-    return { basins: this.basins, box: this.box, labels: [model.states[i], model.states[j]], start: [state.y0[i], state.y0[j]] };
+    return {
+      basins: this.basins,
+      box: this.box,
+      labels: [model.states[i], model.states[j]],
+      start: [state.y0[i], state.y0[j]],
+    };
   }
 
   private motionKey(): string {

@@ -29,7 +29,9 @@ export function drawBranch(pen: Pen, width: number, height: number, data: Branch
   const kinds = branch ? (Object.keys(LINES) as Stability[]).filter((kind) => stabilities(branch).includes(kind)) : [];
   const entries = kinds.map((kind) => lineEntry(LINES[kind].label, theme.ink, LINES[kind].width, LINES[kind].dash));
   const key = layKey(pen, entries, width - SIDES.left - SIDES.right);
-  const [x, y] = branch ? [spanOfAll([branch.value]), spanOfAll(curvesOf(branch, state))] : [padded(0, 1, 0), padded(0, 1, 0)];
+  const [x, y] = branch
+    ? [spanOfAll([branch.value]), spanOfAll(curvesOf(branch, state))]
+    : [padded(0, 1, 0), padded(0, 1, 0)];
   const frame = frameIn(x, y, width, height, { ...SIDES, bottom: BELOW_AXIS + key.height });
   drawAxes(pen, frame, { xLabel: data.labels[0], yLabel: data.labels[1] }, theme);
   if (branch) {

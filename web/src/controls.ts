@@ -28,7 +28,7 @@ export function sliderStep([low, high]: readonly [number, number]): number {
   const raw = (high - low) / POSITIONS;
   if (!(raw > 0)) return 1;
   const power = 10 ** Math.floor(Math.log10(raw));
-  return Number(((([1, 2, 5, 10].find((factor) => factor * power >= raw) ?? 10) * power)).toPrecision(3));
+  return Number((([1, 2, 5, 10].find((factor) => factor * power >= raw) ?? 10) * power).toPrecision(3));
 }
 
 /** A slider and a field for one number. */
@@ -81,7 +81,13 @@ export function quantity(options: QuantityOptions): Quantity {
     options.done();
   });
   set(options.value);
-  const element = make("div", { class: "quantity" }, make("label", { for: id, title: options.title }, showName(options.label)), field, slider);
+  const element = make(
+    "div",
+    { class: "quantity" },
+    make("label", { for: id, title: options.title }, showName(options.label)),
+    field,
+    slider,
+  );
   return { element, set };
 }
 

@@ -22,7 +22,8 @@ export function tracePiece(pen: Pen, run: Run, piece: Piece, i: number, j: numbe
     const x = frame.x.at(coordinate(run, row, i));
     const y = frame.y.at(coordinate(run, row, j));
     if (row === piece.first) pen.moveTo(x, y);
-    else if (row === piece.last || Math.abs(x - lastX) > LEAST_STEP || Math.abs(y - lastY) > LEAST_STEP) pen.lineTo(x, y);
+    else if (row === piece.last || Math.abs(x - lastX) > LEAST_STEP || Math.abs(y - lastY) > LEAST_STEP)
+      pen.lineTo(x, y);
     else continue;
     [lastX, lastY] = [x, y];
   }
@@ -119,7 +120,9 @@ export const findJumps = remembered((run): readonly (readonly [number, number])[
   const bounds = boundsOf(run);
   for (let k = 1; k < run.pieces.length; k++) {
     const [from, to] = [run.pieces[k - 1].last, run.pieces[k].first];
-    const isJump = bounds.some(([low, high], i) => Math.abs(run.y[from * run.n + i] - run.y[to * run.n + i]) > 1e-6 * (high - low));
+    const isJump = bounds.some(
+      ([low, high], i) => Math.abs(run.y[from * run.n + i] - run.y[to * run.n + i]) > 1e-6 * (high - low),
+    );
     if (isJump) jumps.push([from, to]);
   }
   return jumps;

@@ -18,7 +18,9 @@ export class CyclesPanel implements Panel {
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly branchWords = make("p", { class: "quiet", role: "status" });
   private readonly multipliers = make("p", { class: "row quiet" });
-  private readonly go = button("Find the cycle that this run leads to", () => this.press(this.go, (signal) => this.find(signal)));
+  private readonly go = button("Find the cycle that this run leads to", () =>
+    this.press(this.go, (signal) => this.find(signal)),
+  );
   private readonly follow = button("Follow", () => this.press(this.follow, (signal) => this.continue(signal)));
   private readonly job = new Job();
   private branch: Branch | null = null;
@@ -41,12 +43,30 @@ export class CyclesPanel implements Panel {
         next[k] = value;
         state.range = next;
       });
-    const of = select("what is followed", [["cycle", "the cycle"], ["equilibrium", "the equilibrium nearby"]], this.of, (value) => (this.of = value as typeof this.of));
-    const parameter = select("parameter", model.params.map(({ name }) => [name, showName(name)] as const), state.parameter ?? "", (name) => (state.parameter = name));
-    const coordinate = select("state", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.coordinate), (value) => {
-      state.coordinate = Number(value);
-      this.picture.redraw();
-    });
+    const of = select(
+      "what is followed",
+      [
+        ["cycle", "the cycle"],
+        ["equilibrium", "the equilibrium nearby"],
+      ],
+      this.of,
+      (value) => (this.of = value as typeof this.of),
+    );
+    const parameter = select(
+      "parameter",
+      model.params.map(({ name }) => [name, showName(name)] as const),
+      state.parameter ?? "",
+      (name) => (state.parameter = name),
+    );
+    const coordinate = select(
+      "state",
+      model.states.map((name, i) => [String(i), showName(name)] as const),
+      String(state.coordinate),
+      (value) => {
+        state.coordinate = Number(value);
+        this.picture.redraw();
+      },
+    );
     const canFollow = engineFor(context.engines, "continuation") !== null && model.params.length > 0;
     this.element = make(
       "div",
@@ -102,18 +122,25 @@ export class CyclesPanel implements Panel {
   saveables(): Saveable[] {
     if (!this.branch) return [];
     const { width, height } = this.picture;
-    return [{ name: "branch", width, height, draw: (pen, w, h, theme) => void drawBranch(pen, w, h, this.data(), theme) }];
+    return [
+      { name: "branch", width, height, draw: (pen, w, h, theme) => void drawBranch(pen, w, h, this.data(), theme) },
+    ];
   }
 
   numbers(): NumbersFile[] {
     const { branch } = this;
     if (!branch) return [];
     const { states } = this.context.model;
-    const column = (i: number) => Float64Array.from({ length: branch.value.length }, (_, k) => branch.y[k * branch.n + i]);
+    const column = (i: number) =>
+      Float64Array.from({ length: branch.value.length }, (_, k) => branch.y[k * branch.n + i]);
     return [
       {
         name: "branch",
-        text: () => pointsCsv([branch.parameter, ...states, "stable"], [branch.value, ...states.map((_, i) => column(i)), branch.stable]),
+        text: () =>
+          pointsCsv(
+            [branch.parameter, ...states, "stable"],
+            [branch.value, ...states.map((_, i) => column(i)), branch.stable],
+          ),
       },
     ];
   }
@@ -141,8 +168,11 @@ export class CyclesPanel implements Panel {
       this.start = [...cycle.run.y.subarray(0, cycle.run.n)];
       this.foundFor = this.motionKey();
       this.context.showCycle(cycle.run);
-      this.words.textContent = cycle.text || `A ${cycle.stable ? "stable" : "unstable"} cycle of period ${showNumber(cycle.period)}.`;
-      this.multipliers.textContent = cycle.multipliers.length ? `Multipliers: ${cycle.multipliers.map(showComplex).join(",  ")}` : "";
+      this.words.textContent =
+        cycle.text || `A ${cycle.stable ? "stable" : "unstable"} cycle of period ${showNumber(cycle.period)}.`;
+      this.multipliers.textContent = cycle.multipliers.length
+        ? `Multipliers: ${cycle.multipliers.map(showComplex).join(",  ")}`
+        : "";
     } catch (error) {
       this.words.textContent = wordsOf(error) ?? "Stopped.";
     }
@@ -158,7 +188,9 @@ export class CyclesPanel implements Panel {
       const y0 = this.start ?? this.context.end() ?? state.y0;
       const request = { kind: "continuation", ...motionRequest(state), y0, parameter, range, of: this.of };
       this.branch = toBranch(await engine.ask(request, signal));
-      const special = this.branch.special.map(({ code, value, text }) => `${code} at ${showName(this.branch!.parameter)} = ${showNumber(value, 5)}, ${text}`);
+      const special = this.branch.special.map(
+        ({ code, value, text }) => `${code} at ${showName(this.branch!.parameter)} = ${showNumber(value, 5)}, ${text}`,
+      );
       this.branchWords.textContent = [this.branch.text, ...special].join(" · ");
       this.picture.say(this.branch.value.length === 0 ? "The branch has no points." : null);
     } catch (error) {
@@ -172,7 +204,12 @@ export class CyclesPanel implements Panel {
   private data(): BranchData {
     const { model, state } = this.context;
     const parameter = this.branch?.parameter ?? state.parameter ?? "";
-    return { branch: this.branch, state: state.coordinate, labels: [parameter, model.states[state.coordinate]], here: state.params[parameter] };
+    return {
+      branch: this.branch,
+      state: state.coordinate,
+      labels: [parameter, model.states[state.coordinate]],
+      here: state.params[parameter],
+    };
   }
 
   private motionKey(): string {

@@ -61,16 +61,26 @@ export class DiagramPanel implements Panel {
       });
     this.low = bound(0);
     this.high = bound(1);
-    const parameter = select("parameter", model.params.map(({ name }) => [name, showName(name)] as const), state.parameter ?? "", (name) => {
-      state.parameter = name;
-      this.earlier.length = 0;
-      this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
-    });
-    const coordinate = select("state", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.coordinate), (value) => {
-      state.coordinate = Number(value);
-      this.up = null;
-      changed();
-    });
+    const parameter = select(
+      "parameter",
+      model.params.map(({ name }) => [name, showName(name)] as const),
+      state.parameter ?? "",
+      (name) => {
+        state.parameter = name;
+        this.earlier.length = 0;
+        this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
+      },
+    );
+    const coordinate = select(
+      "state",
+      model.states.map((name, i) => [String(i), showName(name)] as const),
+      String(state.coordinate),
+      (value) => {
+        state.coordinate = Number(value);
+        this.up = null;
+        changed();
+      },
+    );
     const carry = make("input", { type: "checkbox", checked: state.carry });
     carry.addEventListener("change", () => ((state.carry = carry.checked), changed()));
     this.back.hidden = true;
@@ -85,8 +95,20 @@ export class DiagramPanel implements Panel {
         this.high,
         labelled("of", coordinate),
         sectionFields(model, state, changed),
-        numberField("transient", state.skip, (value) => ((state.skip = Math.round(value)), changed()), (value) => value >= 0, "returns left out at the start"),
-        numberField("points", state.count, (value) => ((state.count = Math.round(value)), changed()), (value) => value >= 1, "returns that are drawn"),
+        numberField(
+          "transient",
+          state.skip,
+          (value) => ((state.skip = Math.round(value)), changed()),
+          (value) => value >= 0,
+          "returns left out at the start",
+        ),
+        numberField(
+          "points",
+          state.count,
+          (value) => ((state.count = Math.round(value)), changed()),
+          (value) => value >= 1,
+          "returns that are drawn",
+        ),
         make("label", { class: "check" }, carry, "start each value where the last ended"),
       ),
       make("div", { class: "row" }, this.go, this.back, this.words),
@@ -124,14 +146,20 @@ export class DiagramPanel implements Panel {
   saveables(): Saveable[] {
     if (this.points.length === 0) return [];
     const { width, height } = this.picture;
-    const draw: Saveable["draw"] = (pen, w, h, theme) => void drawCloud(pen, w, h, { ...this.data(), resolution: 3, line: null }, theme);
+    const draw: Saveable["draw"] = (pen, w, h, theme) =>
+      void drawCloud(pen, w, h, { ...this.data(), resolution: 3, line: null }, theme);
     return [{ name: "diagram", width, height, draw }];
   }
 
   numbers(): NumbersFile[] {
     if (this.points.length === 0) return [];
     const { model, state } = this.context;
-    return [{ name: "diagram", text: () => pointsCsv([state.parameter ?? "", model.states[state.coordinate]], [this.points.x, this.points.y]) }];
+    return [
+      {
+        name: "diagram",
+        text: () => pointsCsv([state.parameter ?? "", model.states[state.coordinate]], [this.points.x, this.points.y]),
+      },
+    ];
   }
 
   private begin(): void {
@@ -165,7 +193,8 @@ export class DiagramPanel implements Panel {
     this.picture.say(null);
     try {
       await (state.carry ? this.carried(signal) : this.scattered(signal));
-      if (this.points.length === 0) this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range.");
+      if (this.points.length === 0)
+        this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range.");
     } catch (error) {
       const words = wordsOf(error);
       if (words !== null) {
@@ -183,7 +212,12 @@ export class DiagramPanel implements Panel {
   private async scattered(signal: AbortSignal): Promise<void> {
     const values = coarseToFine(evenly(this.context.state.range!, VALUES));
     const requests = chunks(values, CHUNK).map((part) => this.request(part, this.context.state.y0));
-    await askAll(this.context.engines.many(), requests, (reply, request) => this.take(toDiagramPart(reply), request), signal);
+    await askAll(
+      this.context.engines.many(),
+      requests,
+      (reply, request) => this.take(toDiagramPart(reply), request),
+      signal,
+    );
   }
 
   /** Values in their order, each from the end of the last. */
@@ -226,14 +260,17 @@ export class DiagramPanel implements Panel {
 
   private tell(isOver = false): void {
     const { state } = this.context;
-    const parts = [`${this.points.length.toLocaleString("en")} points, ${this.done} of ${VALUES} values of ${state.parameter}`];
+    const parts = [
+      `${this.points.length.toLocaleString("en")} points, ${this.done} of ${VALUES} values of ${state.parameter}`,
+    ];
     if (this.failed.size) parts.push(`${count(this.failed.size, "value")} without an end: ${this.firstFailure()}`);
     if (isOver && this.points.length) parts.push("drag a rectangle to look closer");
     this.words.textContent = parts.join(" · ");
   }
 
   private firstFailure(): string | null {
-    for (const [value, message] of this.failed) return Number.isNaN(value) ? message : `at ${this.context.state.parameter} = ${showNumber(value)}: ${message}`;
+    for (const [value, message] of this.failed)
+      return Number.isNaN(value) ? message : `at ${this.context.state.parameter} = ${showNumber(value)}: ${message}`;
     return null;
   }
 
@@ -242,7 +279,8 @@ export class DiagramPanel implements Panel {
     if (range[0] === range[1]) return;
     state.range = [range[0], range[1]];
     this.up = up;
-    for (const [k, label] of [this.low, this.high].entries()) label.querySelector("input")!.value = showPlain(range[k], range);
+    for (const [k, label] of [this.low, this.high].entries())
+      label.querySelector("input")!.value = showPlain(range[k], range);
     this.back.hidden = this.earlier.length === 0;
     if (isPart) this.refine();
     else this.begin();
@@ -312,7 +350,10 @@ export class DiagramPanel implements Panel {
     const sorted = (a: number, b: number): [number, number] => (a < b ? [a, b] : [b, a]);
     const isFlat = Math.abs(choice.y[1] - choice.y[0]) < 8;
     const range = sorted(frame.x.back(choice.x[0]), frame.x.back(choice.x[1]));
-    this.setWindow({ range, up: isFlat ? this.up : sorted(frame.y.back(choice.y[0]), frame.y.back(choice.y[1])) }, true);
+    this.setWindow(
+      { range, up: isFlat ? this.up : sorted(frame.y.back(choice.y[0]), frame.y.back(choice.y[1])) },
+      true,
+    );
   }
 
   /** A click takes the value of the parameter over into the pictures above. */

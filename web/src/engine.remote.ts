@@ -24,7 +24,8 @@ export class HttpEngine implements Engine {
       if (signal?.aborted) throw error;
       throw new EngineError("The local server does not answer: is `filippov app` still running?", "server");
     }
-    if (!response.ok) throw new EngineError((await response.text()) || `the local server refused (${response.status})`, "server");
+    if (!response.ok)
+      throw new EngineError((await response.text()) || `the local server refused (${response.status})`, "server");
     return readReply(new Uint8Array(await response.arrayBuffer()));
   }
 

@@ -45,7 +45,8 @@ export function showSwitches(target: HTMLElement, run: Run, states: readonly str
     const surface = row.insertCell();
     surface.className = "name";
     surface.textContent = entry.surfaces.map(showExpression).join(", ");
-    row.insertCell().textContent = entry.from === entry.to ? showMode(entry.to) : `${showMode(entry.from)} → ${showMode(entry.to)}`;
+    row.insertCell().textContent =
+      entry.from === entry.to ? showMode(entry.to) : `${showMode(entry.from)} → ${showMode(entry.to)}`;
     entry.y.forEach((value, i) => {
       const cell = row.insertCell();
       cell.className = "number";

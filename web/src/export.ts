@@ -47,7 +47,14 @@ export function curveCsv(run: Run, states: readonly string[]): string {
 export function switchesCsv(run: Run, states: readonly string[]): string {
   const rows = [["t", "kind", "surfaces", "mode_before", "mode_after", ...states].map(cell).join(",")];
   for (const entry of run.switches) {
-    const cells = [String(entry.t), entry.kind, entry.surfaces.join("; "), entry.from, entry.to, ...entry.y.map(String)];
+    const cells = [
+      String(entry.t),
+      entry.kind,
+      entry.surfaces.join("; "),
+      entry.from,
+      entry.to,
+      ...entry.y.map(String),
+    ];
     rows.push(cells.map(cell).join(","));
   }
   return `${rows.join("\n")}\n`;

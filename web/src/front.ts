@@ -8,7 +8,16 @@ import { button, freshId, make, select } from "./dom.ts";
 import { makeEditor, type Editor, type TextReader } from "./editor.ts";
 import { showSwitches } from "./events.ts";
 import { curveCsv, save, switchesCsv, writePng, writeSvg } from "./export.ts";
-import { initialState, motionRequest, PLACES, rangeOf, startRange, type Description, type Place, type State } from "./model.ts";
+import {
+  initialState,
+  motionRequest,
+  PLACES,
+  rangeOf,
+  startRange,
+  type Description,
+  type Place,
+  type State,
+} from "./model.ts";
 import { Motion } from "./motion.ts";
 import { count, showExpression, showName, showNumber } from "./numbers.ts";
 import type { Context, Panel } from "./panel.ts";
@@ -65,7 +74,12 @@ export class Front {
   private readonly stopButton = button("Stop", () => this.motion.stop());
   private readonly notice = make("p", { class: "notice", role: "status" });
   private readonly tabs = new Map<Place, { tab: HTMLButtonElement; body: HTMLElement }>();
-  private readonly switches = make("div", { class: "switches", tabindex: 0, role: "region", "aria-label": "table of switches" });
+  private readonly switches = make("div", {
+    class: "switches",
+    tabindex: 0,
+    role: "region",
+    "aria-label": "table of switches",
+  });
   private readonly closers: (() => void)[] = [];
 
   constructor(
@@ -204,7 +218,10 @@ export class Front {
       host.openProblem && known.length > 1
         ? select("model", [...own, ...known], isKnown ? host.problem! : "", (chosen) => host.openProblem!(chosen))
         : null;
-    const share = host.address === null ? null : button("Copy link", () => void this.share(), "a link that holds the model and this view");
+    const share =
+      host.address === null
+        ? null
+        : button("Copy link", () => void this.share(), "a link that holds the model and this view");
     const theme = button("", () => this.toggleTheme());
     theme.className = "theme";
     return make(
@@ -235,8 +252,20 @@ export class Front {
             "div",
             { class: "file" },
             make("span", {}, picture.name),
-            file("PNG", () => void writePng(picture.draw, picture.width, picture.height, this.theme).then((blob) => save(this.fileName(picture.name, "png"), blob))),
-            file("SVG", () => save(this.fileName(picture.name, "svg"), writeSvg(picture.draw, picture.width, picture.height, this.theme), "image/svg+xml")),
+            file(
+              "PNG",
+              () =>
+                void writePng(picture.draw, picture.width, picture.height, this.theme).then((blob) =>
+                  save(this.fileName(picture.name, "png"), blob),
+                ),
+            ),
+            file("SVG", () =>
+              save(
+                this.fileName(picture.name, "svg"),
+                writeSvg(picture.draw, picture.width, picture.height, this.theme),
+                "image/svg+xml",
+              ),
+            ),
           ),
         ),
       );
@@ -244,18 +273,34 @@ export class Front {
       const { states } = this.model;
       const tables = panels.flatMap((panel) => panel.numbers());
       if (run) {
-        tables.unshift({ name: "curve", text: () => curveCsv(run, states) }, { name: "switches", text: () => switchesCsv(run, states) });
+        tables.unshift(
+          { name: "curve", text: () => curveCsv(run, states) },
+          { name: "switches", text: () => switchesCsv(run, states) },
+        );
       }
       for (const table of tables) {
-        list.append(make("div", { class: "file" }, make("span", {}, table.name), file("CSV", () => save(this.fileName(table.name, "csv"), table.text(), "text/csv"))));
+        list.append(
+          make(
+            "div",
+            { class: "file" },
+            make("span", {}, table.name),
+            file("CSV", () => save(this.fileName(table.name, "csv"), table.text(), "text/csv")),
+          ),
+        );
       }
       list.append(
-        make("div", { class: "file" }, make("span", {}, "Python script"), file("py", () => void this.script().then((text) => save(this.fileName("run", "py"), text, "text/x-python")))),
+        make(
+          "div",
+          { class: "file" },
+          make("span", {}, "Python script"),
+          file("py", () => void this.script().then((text) => save(this.fileName("run", "py"), text, "text/x-python"))),
+        ),
       );
     };
     menu.addEventListener("toggle", () => menu.open && fill());
     const away = (event: Event) => {
-      if (event instanceof KeyboardEvent ? event.key === "Escape" : !event.composedPath().includes(menu)) menu.open = false;
+      if (event instanceof KeyboardEvent ? event.key === "Escape" : !event.composedPath().includes(menu))
+        menu.open = false;
     };
     document.addEventListener("pointerdown", away);
     menu.addEventListener("keydown", away);
@@ -282,7 +327,14 @@ export class Front {
   private buildControls(): HTMLElement {
     const { model, state, motion } = this;
     const settle = () => motion.update(false);
-    const slider = (key: string, label: string, title: string, value: number, range: readonly [number, number], take: (value: number) => void) => {
+    const slider = (
+      key: string,
+      label: string,
+      title: string,
+      value: number,
+      range: readonly [number, number],
+      take: (value: number) => void,
+    ) => {
       const made = quantity({
         label,
         title,
@@ -298,52 +350,97 @@ export class Front {
       return made.element;
     };
     const group = (title: string, elements: HTMLElement[], isOpen = true) => {
-      const details = make("details", { class: "group", open: isOpen }, make("summary", {}, make("h2", {}, title)), ...elements);
+      const details = make(
+        "details",
+        { class: "group", open: isOpen },
+        make("summary", {}, make("h2", {}, title)),
+        ...elements,
+      );
       return elements.length ? details : null;
     };
     const params = model.params.map(({ name, value }) =>
-      slider(`p ${name}`, name, `parameter ${name}`, state.params[name], rangeOf(model, name, value), (v) => (state.params[name] = v)),
+      slider(
+        `p ${name}`,
+        name,
+        `parameter ${name}`,
+        state.params[name],
+        rangeOf(model, name, value),
+        (v) => (state.params[name] = v),
+      ),
     );
     const start = model.states.map((name, i) =>
       slider(`y ${i}`, name, `initial value of ${name}`, state.y0[i], startRange(model, i), (v) => (state.y0[i] = v)),
     );
     const [from, to] = model.page.t_span;
-    const time = slider("t", "until t", "end of the time", state.t_span[1], to > from ? [from, 2 * to - from] : [2 * to - from, from], (v) => {
-      if (v !== state.t_span[0]) state.t_span = [state.t_span[0], v];
-    });
+    const time = slider(
+      "t",
+      "until t",
+      "end of the time",
+      state.t_span[1],
+      to > from ? [from, 2 * to - from] : [2 * to - from, from],
+      (v) => {
+        if (v !== state.t_span[0]) state.t_span = [state.t_span[0], v];
+      },
+    );
     const positive = (value: number) => value > 0;
     const numerics = [
       make(
         "div",
         { class: "fields" },
-        numberField("from t", state.t_span[0], (v) => ((state.t_span = [v, state.t_span[1]]), settle()), (v) => v !== state.t_span[1]),
+        numberField(
+          "from t",
+          state.t_span[0],
+          (v) => ((state.t_span = [v, state.t_span[1]]), settle()),
+          (v) => v !== state.t_span[1],
+        ),
         numberField("rtol", state.rtol, (v) => ((state.rtol = v), settle()), positive),
         numberField("atol", state.atol, (v) => ((state.atol = v), settle()), positive),
-        labelled("method", select("method", [...new Set([...METHODS, state.method])].map((m) => [m, m] as const), state.method, (m) => ((state.method = m), settle()))),
+        labelled(
+          "method",
+          select(
+            "method",
+            [...new Set([...METHODS, state.method])].map((m) => [m, m] as const),
+            state.method,
+            (m) => ((state.method = m), settle()),
+          ),
+        ),
       ),
     ];
     return make(
       "form",
-      { class: "controls", "aria-label": "parameters, start and time", onsubmit: (event: Event) => event.preventDefault() },
+      {
+        class: "controls",
+        "aria-label": "parameters, start and time",
+        onsubmit: (event: Event) => event.preventDefault(),
+      },
       group("Parameters", params),
       group("Start", start.slice(0, MANY_STATES)),
       group(`${model.n - MANY_STATES} more states`, start.slice(MANY_STATES), false),
       group("Time", [time]),
       group("Accuracy", numerics, false),
-      make("div", { class: "row" }, button("Reset", () => this.reset(), "parameters, start and time as the model has them")),
+      make(
+        "div",
+        { class: "row" },
+        button("Reset", () => this.reset(), "parameters, start and time as the model has them"),
+      ),
     );
   }
 
   private buildPortrait(): HTMLElement {
     const { model, motion, state } = this;
     const axis = (k: 0 | 1) =>
-      select(k === 0 ? "state across" : "state upwards", model.states.map((name, i) => [String(i), showName(name)] as const), String(state.axes![k]), (value) => {
-        const axes: [number, number] = [...state.axes!];
-        axes[k] = Number(value);
-        if (axes[0] === axes[1]) axes[1 - k] = state.axes![k];
-        this.axisFields.forEach((field, i) => (field.value = String(axes[i])));
-        motion.setAxes(axes);
-      });
+      select(
+        k === 0 ? "state across" : "state upwards",
+        model.states.map((name, i) => [String(i), showName(name)] as const),
+        String(state.axes![k]),
+        (value) => {
+          const axes: [number, number] = [...state.axes!];
+          axes[k] = Number(value);
+          if (axes[0] === axes[1]) axes[1 - k] = state.axes![k];
+          this.axisFields.forEach((field, i) => (field.value = String(axes[i])));
+          motion.setAxes(axes);
+        },
+      );
     this.axisFields = [axis(0), axis(1)];
     const tools = make(
       "div",
@@ -355,7 +452,12 @@ export class Front {
       button("+", () => motion.zoom(1 / 1.25), "larger (+)"),
       button("Fit", () => motion.fit(), "fit the axes to the motion (f)"),
     );
-    return make("section", { class: "figure", "aria-label": "phase portrait" }, make("div", { class: "head" }, make("h2", {}, "Phase portrait"), tools), motion.portrait!.element);
+    return make(
+      "section",
+      { class: "figure", "aria-label": "phase portrait" },
+      make("div", { class: "head" }, make("h2", {}, "Phase portrait"), tools),
+      motion.portrait!.element,
+    );
   }
 
   private buildSeries(): HTMLElement {
@@ -364,12 +466,26 @@ export class Front {
     if (model.n > motion.panels.length) {
       const boxes = model.states.map((name, i) => {
         const box = make("input", { type: "checkbox", checked: motion.panels.includes(i) });
-        box.addEventListener("change", () => motion.setShown(boxes.flatMap(({ box: one }, k) => (one.checked ? [k] : []))));
+        box.addEventListener("change", () =>
+          motion.setShown(boxes.flatMap(({ box: one }, k) => (one.checked ? [k] : []))),
+        );
         return { box, element: make("label", { class: "check" }, box, showName(name)) };
       });
-      tools.append(make("details", { class: "menu" }, make("summary", {}, "States"), make("div", { class: "list" }, ...boxes.map(({ element }) => element))));
+      tools.append(
+        make(
+          "details",
+          { class: "menu" },
+          make("summary", {}, "States"),
+          make("div", { class: "list" }, ...boxes.map(({ element }) => element)),
+        ),
+      );
     }
-    return make("section", { class: "figure", "aria-label": "time series" }, make("div", { class: "head" }, make("h2", {}, "Time series"), this.reading, tools), motion.series.element);
+    return make(
+      "section",
+      { class: "figure", "aria-label": "time series" },
+      make("div", { class: "head" }, make("h2", {}, "Time series"), this.reading, tools),
+      motion.series.element,
+    );
   }
 
   private buildPlaces(): HTMLElement {
@@ -380,7 +496,11 @@ export class Front {
     const order = PLACES.filter((place) => bodies[place]);
     for (const place of order) {
       const [tabId, bodyId] = [freshId("tab"), freshId("place")];
-      const tab = make("button", { type: "button", role: "tab", id: tabId, "aria-controls": bodyId, onclick: () => this.showPlace(place) }, PLACE_NAMES[place]);
+      const tab = make(
+        "button",
+        { type: "button", role: "tab", id: tabId, "aria-controls": bodyId, onclick: () => this.showPlace(place) },
+        PLACE_NAMES[place],
+      );
       tab.addEventListener("keydown", (event) => {
         const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
         if (step === undefined) return;
@@ -452,7 +572,8 @@ export class Front {
     this.status.classList.toggle("wrong", run !== null && !run.success);
     if (run === null) {
       this.status.textContent = words === null ? "stopped" : ""; // words stand where the pictures were
-      if (words !== null) this.switches.replaceChildren(make("p", { class: "quiet" }, "There is no run to list switches of."));
+      if (words !== null)
+        this.switches.replaceChildren(make("p", { class: "quiet" }, "There is no run to list switches of."));
     } else {
       this.status.textContent = describeRun(run);
       this.status.title = run.warnings.map(({ message }) => message).join("\n");

@@ -17,7 +17,11 @@ const LINE = 21;
 const GAP = 18;
 
 /** The places of the entries, broken into lines, and the height that they take. */
-export function layKey(pen: Pen, entries: readonly KeyEntry[], width: number): { x: number[]; y: number[]; height: number } {
+export function layKey(
+  pen: Pen,
+  entries: readonly KeyEntry[],
+  width: number,
+): { x: number[]; y: number[]; height: number } {
   setFont(pen, SIZE);
   const x: number[] = [];
   const y: number[] = [];
@@ -32,7 +36,14 @@ export function layKey(pen: Pen, entries: readonly KeyEntry[], width: number): {
   return { x, y, height: entries.length ? (line + 1) * LINE : 0 };
 }
 
-export function drawKey(pen: Pen, entries: readonly KeyEntry[], left: number, top: number, width: number, theme: Theme): void {
+export function drawKey(
+  pen: Pen,
+  entries: readonly KeyEntry[],
+  left: number,
+  top: number,
+  width: number,
+  theme: Theme,
+): void {
   pen.save();
   const { x, y } = layKey(pen, entries, width);
   entries.forEach((entry, k) => {

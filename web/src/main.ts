@@ -92,7 +92,8 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
         history.replaceState(null, "", location.href.split("#")[0]);
         Object.assign(element, { front: next() });
       });
-    return () => mount(element, { engine: engines, model, state: fragment.view, host: { ...common, bytes, problem, openModel } });
+    return () =>
+      mount(element, { engine: engines, model, state: fragment.view, host: { ...common, bytes, problem, openModel } });
   };
 
   if (fragment.model) return await show(fragment.model, null);
@@ -100,14 +101,12 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
   if (fragment.token !== null) return await fromServer(element, fragment.token, show);
   const name = document.body.dataset.problem ?? problems[0]?.name;
   if (name !== undefined) return await show(await fetchProblem(name), name);
-  throw new Error("This page was opened without a model. Open it by `filippov app MODEL.py`, or by a link that carries one.");
+  throw new Error(
+    "This page was opened without a model. Open it by `filippov app MODEL.py`, or by a link that carries one.",
+  );
 }
 
-async function fromServer(
-  element: HTMLElement,
-  token: string,
-  show: Show,
-): Promise<() => Front> {
+async function fromServer(element: HTMLElement, token: string, show: Show): Promise<() => Front> {
   const response = await fetch("model", { headers: { "X-Filippov-Token": token } });
   if (response.status !== 200 && response.status !== 204) {
     throw new Error((await response.text()) || `The local server gives no model (${response.status}).`);

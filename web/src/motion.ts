@@ -69,8 +69,11 @@ export class Motion {
     this.portrait =
       state.axes === null
         ? null
-        : new Picture("portrait", (pen, w, h, t) => void (this.frame = this.paintPortrait(pen, w, h, t, false)), theme, () =>
-            describePortrait(this.portraitData(false)),
+        : new Picture(
+            "portrait",
+            (pen, w, h, t) => void (this.frame = this.paintPortrait(pen, w, h, t, false)),
+            theme,
+            () => describePortrait(this.portraitData(false)),
           );
     this.series = new Picture(
       "series",
@@ -154,7 +157,9 @@ export class Motion {
     const at = t !== null && this.run ? stateAt(this.run, t) : null;
     if (at === null) this.hooks.read("");
     else {
-      const values = at.y.map((value, i) => `${showName(this.model.states[i])} = ${showNumber(value, 5)}`).slice(0, MOST_PANELS);
+      const values = at.y
+        .map((value, i) => `${showName(this.model.states[i])} = ${showNumber(value, 5)}`)
+        .slice(0, MOST_PANELS);
       this.hooks.read([`t = ${showNumber(t!, 5)}`, ...values, `mode ${showMode(at.mode)}`].join("    "));
     }
     this.redraw();
@@ -179,7 +184,15 @@ export class Motion {
     };
     if (!this.portrait) return [series];
     const { width, height } = this.portrait;
-    return [{ name: "phase portrait", width, height, draw: (pen, w, h, theme) => void this.paintPortrait(pen, w, h, theme, true) }, series];
+    return [
+      {
+        name: "phase portrait",
+        width,
+        height,
+        draw: (pen, w, h, theme) => void this.paintPortrait(pen, w, h, theme, true),
+      },
+      series,
+    ];
   }
 
   close(): void {
@@ -193,7 +206,8 @@ export class Motion {
     try {
       const run = toRun(await this.engine.ask({ kind: "run", ...motionRequest(this.state) }, signal));
       const kept: Run[] = [];
-      for (const y0 of this.state.kept) kept.push(toRun(await this.engine.ask({ kind: "run", ...motionRequest(this.state), y0 }, signal)));
+      for (const y0 of this.state.kept)
+        kept.push(toRun(await this.engine.ask({ kind: "run", ...motionRequest(this.state), y0 }, signal)));
       this.run = run;
       this.kept = kept;
       if (run.t.length === 0) throw new Error(run.message || "The run has no points.");
@@ -369,7 +383,10 @@ export class Motion {
     const direction = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
     if (direction && axes) {
       const size = KEY_STEP * (event.shiftKey ? 10 : 1);
-      this.startAt([y0[axes[0]] + direction[0] * size * (x[1] - x[0]), y0[axes[1]] + direction[1] * size * (y[1] - y[0])]);
+      this.startAt([
+        y0[axes[0]] + direction[0] * size * (x[1] - x[0]),
+        y0[axes[1]] + direction[1] * size * (y[1] - y[0]),
+      ]);
     } else if (event.key === "f") this.fit();
     else if (event.key === "k") this.keep();
     else if (event.key === "+" || event.key === "=") this.zoom(1 / 1.25);
@@ -381,7 +398,10 @@ export class Motion {
   /** Zoom about a point, or about the middle. */
   zoom(factor: number, about?: readonly [number, number]): void {
     const { x, y } = this.window();
-    const around = ([low, high]: Interval, middle: number): [number, number] => [middle + factor * (low - middle), middle + factor * (high - middle)];
+    const around = ([low, high]: Interval, middle: number): [number, number] => [
+      middle + factor * (low - middle),
+      middle + factor * (high - middle),
+    ];
     const [cx, cy] = about ?? [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
     this.box = { x: around(x, cx), y: around(y, cy) };
     this.state.box = [...this.box.x, ...this.box.y] as [number, number, number, number];

@@ -152,7 +152,11 @@ export interface Engines {
 }
 
 /** Engines in workers, or in the page where the host allows no workers. */
-export async function makeEngines(module: WebAssembly.Module, model: Uint8Array, kernel: Engine | null = null): Promise<Engines> {
+export async function makeEngines(
+  module: WebAssembly.Module,
+  model: Uint8Array,
+  kernel: Engine | null = null,
+): Promise<Engines> {
   const quick = new WorkerEngine(module, model);
   try {
     await quick.start();

@@ -116,7 +116,10 @@ function drawRun(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: F
 
 /** A cycle lies on the trajectories, heavy, with a rim. */
 function drawCycle(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: Frame, theme: Theme): void {
-  for (const [colour, width] of [[theme.ground, CYCLE_WIDTH + 2.4], [cycleColour(theme), CYCLE_WIDTH]] as const) {
+  for (const [colour, width] of [
+    [theme.ground, CYCLE_WIDTH + 2.4],
+    [cycleColour(theme), CYCLE_WIDTH],
+  ] as const) {
     pen.strokeStyle = colour;
     pen.lineWidth = width;
     pen.beginPath();
@@ -211,7 +214,13 @@ function drawSign(pen: Pen, x: number, y: number, isPseudo: boolean, stable: boo
   pen.setLineDash([]);
 }
 
-function drawEquilibrium(pen: Pen, point: Equilibrium, [i, j]: readonly [number, number], frame: Frame, theme: Theme): void {
+function drawEquilibrium(
+  pen: Pen,
+  point: Equilibrium,
+  [i, j]: readonly [number, number],
+  frame: Frame,
+  theme: Theme,
+): void {
   if (!point.admissible) return;
   drawSign(pen, frame.x.at(point.y[i]), frame.y.at(point.y[j]), point.surfaces.length > 0, point.stable, theme);
 }
@@ -249,7 +258,8 @@ function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
   }
   for (const isPseudo of [false, true]) {
     for (const stable of [true, false, null]) {
-      const is = (point: Equilibrium) => point.admissible && point.surfaces.length > 0 === isPseudo && point.stable === stable;
+      const is = (point: Equilibrium) =>
+        point.admissible && point.surfaces.length > 0 === isPseudo && point.stable === stable;
       if (!plane?.equilibria.some(is)) continue;
       const name = isPseudo ? "pseudo-equilibrium" : "equilibrium";
       entries.push({

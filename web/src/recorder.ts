@@ -2,38 +2,39 @@
 
 import type { Pen, Raster } from "./pen.ts";
 
-interface Ink {
-  strokeStyle: Pen["strokeStyle"];
-  fillStyle: Pen["fillStyle"];
-  lineWidth: number;
-  lineCap: CanvasLineCap;
-  lineJoin: CanvasLineJoin;
-  globalAlpha: number;
-  font: string;
-  textAlign: CanvasTextAlign;
-  textBaseline: CanvasTextBaseline;
-  dash: readonly number[];
-  clips: number;
-}
+/** What `save` keeps. */
+const KEPT = [
+  "strokeStyle",
+  "fillStyle",
+  "lineWidth",
+  "lineCap",
+  "lineJoin",
+  "globalAlpha",
+  "font",
+  "textAlign",
+  "textBaseline",
+  "dash",
+  "clips",
+] as const;
+type Kept = Pick<SvgPen, (typeof KEPT)[number]>;
 
 const FULL_TURN = 2 * Math.PI;
 const ANCHORS: Partial<Record<CanvasTextAlign, string>> = { center: "middle", right: "end", end: "end" };
 
 export class SvgPen implements Pen {
-  private readonly ink: Ink = {
-    strokeStyle: "#000",
-    fillStyle: "#000",
-    lineWidth: 1,
-    lineCap: "butt",
-    lineJoin: "miter",
-    globalAlpha: 1,
-    font: "10px sans-serif",
-    textAlign: "start",
-    textBaseline: "alphabetic",
-    dash: [],
-    clips: 0,
-  };
-  private readonly kept: Ink[] = [];
+  strokeStyle: Pen["strokeStyle"] = "#000";
+  fillStyle: Pen["fillStyle"] = "#000";
+  lineWidth = 1;
+  lineCap: CanvasLineCap = "butt";
+  lineJoin: CanvasLineJoin = "miter";
+  globalAlpha = 1;
+  font = "10px sans-serif";
+  textAlign: CanvasTextAlign = "start";
+  textBaseline: CanvasTextBaseline = "alphabetic";
+  dash: readonly number[] = [];
+  /** Groups with a clip that are open. */
+  clips = 0;
+  private readonly kept: Kept[] = [];
   private readonly body: string[] = [];
   private readonly clipPaths: string[] = [];
   private path: string[] = [];
@@ -45,34 +46,15 @@ export class SvgPen implements Pen {
     private readonly embed: (raster: Raster) => string,
   ) {}
 
-  get strokeStyle() { return this.ink.strokeStyle; }
-  set strokeStyle(value) { this.ink.strokeStyle = value; }
-  get fillStyle() { return this.ink.fillStyle; }
-  set fillStyle(value) { this.ink.fillStyle = value; }
-  get lineWidth() { return this.ink.lineWidth; }
-  set lineWidth(value) { this.ink.lineWidth = value; }
-  get lineCap() { return this.ink.lineCap; }
-  set lineCap(value) { this.ink.lineCap = value; }
-  get lineJoin() { return this.ink.lineJoin; }
-  set lineJoin(value) { this.ink.lineJoin = value; }
-  get globalAlpha() { return this.ink.globalAlpha; }
-  set globalAlpha(value) { this.ink.globalAlpha = value; }
-  get font() { return this.ink.font; }
-  set font(value) { this.ink.font = value; }
-  get textAlign() { return this.ink.textAlign; }
-  set textAlign(value) { this.ink.textAlign = value; }
-  get textBaseline() { return this.ink.textBaseline; }
-  set textBaseline(value) { this.ink.textBaseline = value; }
-
   save(): void {
-    this.kept.push({ ...this.ink });
+    this.kept.push(Object.fromEntries(KEPT.map((name) => [name, this[name]])) as unknown as Kept);
   }
 
   restore(): void {
     const before = this.kept.pop();
     if (!before) return;
-    this.body.push("</g>".repeat(this.ink.clips - before.clips));
-    Object.assign(this.ink, before);
+    this.body.push("</g>".repeat(this.clips - before.clips));
+    Object.assign(this, before);
   }
 
   beginPath(): void {
@@ -107,50 +89,53 @@ export class SvgPen implements Pen {
   clip(): void {
     this.clipPaths.push(this.path.join(""));
     this.body.push(`<g clip-path="url(#clip${this.clipPaths.length})">`);
-    this.ink.clips += 1;
+    this.clips += 1;
   }
 
   stroke(): void {
-    const { strokeStyle, lineWidth, lineCap, lineJoin, dash } = this.ink;
+    const { strokeStyle, lineWidth, lineCap, lineJoin, dash } = this;
     const extra = [
       lineCap === "butt" ? "" : ` stroke-linecap="${lineCap}"`,
       lineJoin === "miter" ? "" : ` stroke-linejoin="${lineJoin}"`,
       dash.length ? ` stroke-dasharray="${dash.map(short).join(" ")}"` : "",
     ].join("");
-    this.add(`<path d="${this.path.join("")}" fill="none" stroke="${strokeStyle}" stroke-width="${short(lineWidth)}"${extra}`, "/>");
+    this.add(
+      `<path d="${this.path.join("")}" fill="none" stroke="${strokeStyle}" stroke-width="${short(lineWidth)}"${extra}`,
+      "/>",
+    );
   }
 
   fill(): void {
-    this.add(`<path d="${this.path.join("")}" fill="${this.ink.fillStyle}"`, "/>");
+    this.add(`<path d="${this.path.join("")}" fill="${this.fillStyle}"`, "/>");
   }
 
   fillRect(x: number, y: number, width: number, height: number): void {
     this.add(
-      `<rect x="${short(x)}" y="${short(y)}" width="${short(width)}" height="${short(height)}" fill="${this.ink.fillStyle}"`,
+      `<rect x="${short(x)}" y="${short(y)}" width="${short(width)}" height="${short(height)}" fill="${this.fillStyle}"`,
       "/>",
     );
   }
 
   fillText(text: string, x: number, y: number): void {
-    const { style, size, family } = readFont(this.ink.font);
-    const down = { middle: 0.35, top: 0.8, hanging: 0.8 }[this.ink.textBaseline as string] ?? 0;
-    const anchor = ANCHORS[this.ink.textAlign];
+    const { style, size, family } = readFont(this.font);
+    const down = { middle: 0.35, top: 0.8, hanging: 0.8 }[this.textBaseline as string] ?? 0;
+    const anchor = ANCHORS[this.textAlign];
     this.add(
       `<text x="${short(x)}" y="${short(y + down * size)}" font-size="${size}" font-family="${escape(family)}"` +
         (style ? ` font-style="${style}"` : "") +
         (anchor ? ` text-anchor="${anchor}"` : "") +
-        ` fill="${this.ink.fillStyle}" xml:space="preserve"`,
+        ` fill="${this.fillStyle}" xml:space="preserve"`,
       `>${escape(text)}</text>`,
     );
   }
 
   /** About the width of the text: no letters are laid out here. */
   measureText(text: string): { readonly width: number } {
-    return { width: 0.56 * readFont(this.ink.font).size * text.length };
+    return { width: 0.56 * readFont(this.font).size * text.length };
   }
 
   setLineDash(pattern: number[]): void {
-    this.ink.dash = pattern;
+    this.dash = pattern;
   }
 
   raster(raster: Raster, x: number, y: number, width: number, height: number): void {
@@ -164,7 +149,7 @@ export class SvgPen implements Pen {
   /** The file. */
   toString(): string {
     const clips = this.clipPaths.map((d, i) => `<clipPath id="clip${i + 1}"><path d="${d}"/></clipPath>`).join("");
-    const open = this.ink.clips > 0 ? "</g>".repeat(this.ink.clips) : "";
+    const open = this.clips > 0 ? "</g>".repeat(this.clips) : "";
     return (
       `<svg xmlns="http://www.w3.org/2000/svg" width="${this.width}" height="${this.height}" ` +
       `viewBox="0 0 ${this.width} ${this.height}"><defs>${clips}</defs>\n${this.body.join("\n")}${open}\n</svg>\n`
@@ -172,7 +157,7 @@ export class SvgPen implements Pen {
   }
 
   private add(start: string, end: string): void {
-    const alpha = this.ink.globalAlpha < 1 ? ` opacity="${short(this.ink.globalAlpha)}"` : "";
+    const alpha = this.globalAlpha < 1 ? ` opacity="${short(this.globalAlpha)}"` : "";
     this.body.push(start + alpha + end);
   }
 }

@@ -110,7 +110,12 @@ export interface Branch {
   readonly low: Float64Array | null;
   readonly high: Float64Array | null;
   readonly stable: Float64Array;
-  readonly special: readonly { readonly index: number; readonly value: number; readonly code: string; readonly text: string }[];
+  readonly special: readonly {
+    readonly index: number;
+    readonly value: number;
+    readonly code: string;
+    readonly text: string;
+  }[];
   readonly text: string;
 }
 
@@ -147,7 +152,13 @@ export function toPlane(reply: Reply, t: number): Plane {
 export function toReturns(reply: Reply): Returns {
   const y = reply.table("y");
   const { message, success } = reply.header;
-  return { n: y.shape[1] ?? 1, t: reply.table("t").data, y: y.data, message: String(message ?? ""), success: success !== false };
+  return {
+    n: y.shape[1] ?? 1,
+    t: reply.table("t").data,
+    y: y.data,
+    message: String(message ?? ""),
+    success: success !== false,
+  };
 }
 
 export function toDiagramPart(reply: Reply): DiagramPart {

@@ -16,7 +16,12 @@ export function writeScript(description: Description, state: State, model: Uint8
   if (state.method !== "auto") options.push(`method=${JSON.stringify(state.method)}`);
   const span = `(${state.t_span.map(python).join(", ")})`;
   const given = names.length ? "y0, params" : "y0";
-  lines.push(`sol = system.solve(${span}, ${given}, ${options.join(", ")})`, "", "print(sol.message)", "print(sol.switches)");
+  lines.push(
+    `sol = system.solve(${span}, ${given}, ${options.join(", ")})`,
+    "",
+    "print(sol.message)",
+    "print(sol.switches)",
+  );
   return `${lines.join("\n")}\n`;
 }
 
@@ -32,11 +37,16 @@ export function python(value: number): string {
 }
 
 function source(reference: string | null, text: string | null, n: number, model: Uint8Array | null): string[] {
-  if (reference) return ["import filippov as fl", "", `system = fl.problems.get(${JSON.stringify(reference)}).system()`];
+  if (reference)
+    return ["import filippov as fl", "", `system = fl.problems.get(${JSON.stringify(reference)}).system()`];
   const name = text ? lastFunction(text) : null;
   if (text && name) return ["import filippov as fl", text.trimEnd(), "", `system = fl.System(${name}, n=${n})`];
   if (!model) {
-    return ["import filippov as fl", "", "# The function lives in the program that opened this page: `system` is its system."];
+    return [
+      "import filippov as fl",
+      "",
+      "# The function lives in the program that opened this page: `system` is its system.",
+    ];
   }
   const packed = toBase64(model);
   const rows = packed.match(new RegExp(`.{1,${LINE}}`, "g")) ?? [""];

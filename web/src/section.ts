@@ -36,7 +36,10 @@ export class SectionPanel implements Panel {
       () => this.sentence(),
     );
     const update = () => this.update();
-    const names = (k: number) => [...model.states.map((name, i) => [String(i), showName(name)] as const), ...(k === 0 ? [[String(RETURN), "return"] as const] : [])];
+    const names = (k: number) => [
+      ...model.states.map((name, i) => [String(i), showName(name)] as const),
+      ...(k === 0 ? [[String(RETURN), "return"] as const] : []),
+    ];
     const axis = (k: 0 | 1) =>
       select(k === 0 ? "state across" : "state upwards", names(k), String(this.axes[k]), (value) => {
         this.axes[k] = Number(value);
@@ -49,8 +52,20 @@ export class SectionPanel implements Panel {
         "form",
         { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
         sectionFields(model, state, update),
-        numberField("transient", state.skip, (value) => ((state.skip = Math.round(value)), update()), (value) => value >= 0, "returns left out at the start"),
-        numberField("points", state.count, (value) => ((state.count = Math.round(value)), update()), (value) => value >= 1, "returns that are drawn"),
+        numberField(
+          "transient",
+          state.skip,
+          (value) => ((state.skip = Math.round(value)), update()),
+          (value) => value >= 0,
+          "returns left out at the start",
+        ),
+        numberField(
+          "points",
+          state.count,
+          (value) => ((state.count = Math.round(value)), update()),
+          (value) => value >= 1,
+          "returns that are drawn",
+        ),
         labelled("across", axis(0)),
         labelled("up", axis(1)),
       ),
@@ -87,7 +102,9 @@ export class SectionPanel implements Panel {
   saveables(): Saveable[] {
     if (!this.found) return [];
     const { width, height } = this.picture;
-    return [{ name: "section", width, height, draw: (pen, w, h, theme) => void drawCloud(pen, w, h, this.data(), theme) }];
+    return [
+      { name: "section", width, height, draw: (pen, w, h, theme) => void drawCloud(pen, w, h, this.data(), theme) },
+    ];
   }
 
   numbers(): NumbersFile[] {
@@ -95,7 +112,9 @@ export class SectionPanel implements Panel {
     if (!found) return [];
     const column = (i: number) => Float64Array.from({ length: found.t.length }, (_, k) => found.y[k * found.n + i]);
     const { states } = this.context.model;
-    return [{ name: "section", text: () => pointsCsv(["t", ...states], [found.t, ...states.map((_, i) => column(i))]) }];
+    return [
+      { name: "section", text: () => pointsCsv(["t", ...states], [found.t, ...states.map((_, i) => column(i))]) },
+    ];
   }
 
   private async compute(): Promise<void> {
@@ -129,7 +148,9 @@ export class SectionPanel implements Panel {
     points.clear();
     if (found) {
       const column = (which: number) =>
-        Float64Array.from({ length: found.t.length }, (_, k) => (which === RETURN ? k + 1 : found.y[k * found.n + which]));
+        Float64Array.from({ length: found.t.length }, (_, k) =>
+          which === RETURN ? k + 1 : found.y[k * found.n + which],
+        );
       points.add(column(this.axes[0]), column(this.axes[1]));
       const { state } = this.context;
       this.words.textContent = `${count(found.t.length, "return")} ${showSection(state.section)}, after a transient of ${state.skip}`;
@@ -139,7 +160,9 @@ export class SectionPanel implements Panel {
 
   private data(): CloudData {
     const { points } = this;
-    const box = points.length ? { x: spanOfPoints(points.x), y: spanOfPoints(points.y) } : { x: padded(0, 1, 0), y: padded(0, 1, 0) };
+    const box = points.length
+      ? { x: spanOfPoints(points.x), y: spanOfPoints(points.y) }
+      : { x: padded(0, 1, 0), y: padded(0, 1, 0) };
     const label = (which: number) => (which === RETURN ? "return" : this.context.model.states[which]);
     return {
       points,

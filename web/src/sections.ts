@@ -11,11 +11,16 @@ export function sectionFields(model: Description, state: State, changed: () => v
   const build = () => {
     const options = optionsOf(model);
     const chosen = state.section;
-    const pick = select("where to look at the motion", options.map(({ key, label }) => [key, label] as const), keyOf(chosen), (key) => {
-      state.section = options.find((option) => option.key === key)?.section ?? null;
-      build();
-      changed();
-    });
+    const pick = select(
+      "where to look at the motion",
+      options.map(({ key, label }) => [key, label] as const),
+      keyOf(chosen),
+      (key) => {
+        state.section = options.find((option) => option.key === key)?.section ?? null;
+        build();
+        changed();
+      },
+    );
     const parts: HTMLElement[] = [labelled("at", pick)];
     if (chosen?.by === "period") {
       const { phase } = chosen;
@@ -45,7 +50,11 @@ function optionsOf(model: Description): Option[] {
   }));
   const frequency = frequencyOf(model);
   if (frequency !== null) {
-    options.push({ key: "forcing", label: `each period 2π/${showName(frequency)}`, section: { by: "forcing", frequency, phase: 0 } });
+    options.push({
+      key: "forcing",
+      label: `each period 2π/${showName(frequency)}`,
+      section: { by: "forcing", frequency, phase: 0 },
+    });
   }
   options.push({ key: "period", label: "each period of …", section: { by: "period", period: 2 * Math.PI, phase: 0 } });
   return options;

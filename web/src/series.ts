@@ -152,7 +152,9 @@ export function describeSeries(data: SeriesData): string {
   const names = shown.map((state) => states[state]).join(", ");
   if (!run) return `Time series of ${names}.`;
   const bounds = boundsOf(run);
-  const ranges = shown.map((state) => `${states[state]} between ${bounds[state].map((v) => showNumber(v, 4)).join(" and ")}`);
+  const ranges = shown.map(
+    (state) => `${states[state]} between ${bounds[state].map((v) => showNumber(v, 4)).join(" and ")}`,
+  );
   return (
     `Time series of ${names} from t = ${showNumber(data.window[0], 5)} to ${showNumber(data.window[1], 5)}: ` +
     `${ranges.join(", ")}; ${count(run.switches.length, "switch", "switches")}.`

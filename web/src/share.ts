@@ -18,7 +18,9 @@ const LARGEST = 4 << 20; // bytes of an unpacked part: a link is not a way to fi
 
 export async function writeFragment(what: { model?: Uint8Array; problem?: string }, view: unknown): Promise<string> {
   const parts = [
-    what.problem !== undefined ? `p=${encodeURIComponent(what.problem)}` : `m=${await pack(what.model ?? new Uint8Array())}`,
+    what.problem !== undefined
+      ? `p=${encodeURIComponent(what.problem)}`
+      : `m=${await pack(what.model ?? new Uint8Array())}`,
     `s=${await pack(new TextEncoder().encode(JSON.stringify(view)))}`,
   ];
   return `#${parts.join("&")}`;
@@ -61,10 +63,13 @@ export async function unpack(text: string): Promise<Uint8Array> {
 async function through(bytes: Uint8Array, stream: CompressionStream | DecompressionStream): Promise<Uint8Array> {
   const writer = stream.writable.getWriter();
   // both ends at once: a stream waits for its reader; a fault of the writer is that of the reader too
-  const written = writer.write(bytes as Uint8Array<ArrayBuffer>).then(() => writer.close()).catch(() => undefined);
+  const written = writer
+    .write(bytes as Uint8Array<ArrayBuffer>)
+    .then(() => writer.close())
+    .catch(() => undefined);
   const chunks: Uint8Array[] = [];
   let size = 0;
-  for (const reader = stream.readable.getReader(); ; ) {
+  for (const reader = stream.readable.getReader(); ;) {
     const { done, value } = await reader.read();
     if (done) break;
     size += value.length;
@@ -114,26 +119,39 @@ export function toState(model: Description, view: unknown): State {
     }
   }
   if (isNumbers(given.y0, model.n)) state.y0 = [...given.y0];
-  if (isNumbers(given.t_span, 2) && given.t_span[0] !== given.t_span[1]) state.t_span = [given.t_span[0], given.t_span[1]];
+  if (isNumbers(given.t_span, 2) && given.t_span[0] !== given.t_span[1])
+    state.t_span = [given.t_span[0], given.t_span[1]];
   for (const name of ["rtol", "atol"] as const) {
     const value = given[name];
     if (isNumber(value) && value > 0) state[name] = value;
   }
   if (typeof given.method === "string") state.method = given.method;
-  if (isNumbers(given.axes, 2) && given.axes.every((k) => Number.isInteger(k) && k >= 0 && k < model.n) && given.axes[0] !== given.axes[1]) {
+  if (
+    isNumbers(given.axes, 2) &&
+    given.axes.every((k) => Number.isInteger(k) && k >= 0 && k < model.n) &&
+    given.axes[0] !== given.axes[1]
+  ) {
     state.axes = [given.axes[0], given.axes[1]];
   }
   if (isNumbers(given.box, 4) && given.box[0] < given.box[1] && given.box[2] < given.box[3]) {
     state.box = [given.box[0], given.box[1], given.box[2], given.box[3]];
   }
   if (Array.isArray(given.kept)) {
-    state.kept = given.kept.filter((start) => isNumbers(start, model.n)).slice(0, MOST_KEPT).map((start) => [...start]);
+    state.kept = given.kept
+      .filter((start) => isNumbers(start, model.n))
+      .slice(0, MOST_KEPT)
+      .map((start) => [...start]);
   }
   const place = PLACES.find((name) => name === given.place);
   if (place) state.place = place;
   if (typeof given.parameter === "string" && given.parameter in state.params) state.parameter = given.parameter;
   if (isNumbers(given.range, 2) && given.range[0] !== given.range[1]) state.range = [given.range[0], given.range[1]];
-  if (isNumber(given.coordinate) && Number.isInteger(given.coordinate) && given.coordinate >= 0 && given.coordinate < model.n) {
+  if (
+    isNumber(given.coordinate) &&
+    Number.isInteger(given.coordinate) &&
+    given.coordinate >= 0 &&
+    given.coordinate < model.n
+  ) {
     state.coordinate = given.coordinate;
   }
   for (const name of ["skip", "count"] as const) {
@@ -151,7 +169,8 @@ function toSection(model: Description, given: unknown): State["section"] {
   if (given.by === "surface" && typeof given.surface === "string" && model.surfaces.includes(given.surface)) {
     return { by: "surface", surface: given.surface };
   }
-  if (given.by === "period" && isNumber(given.period) && given.period > 0) return { by: "period", period: given.period, phase };
+  if (given.by === "period" && isNumber(given.period) && given.period > 0)
+    return { by: "period", period: given.period, phase };
   if (given.by === "forcing" && model.params.some(({ name }) => name === given.frequency)) {
     return { by: "forcing", frequency: given.frequency as string, phase };
   }

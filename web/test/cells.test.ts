@@ -15,7 +15,10 @@ test("the first row of the cells is the lowest of the picture", () => {
 
 test("ends have letters and shares, and the sentence has their words", () => {
   assert.deepEqual([0, 25, 26].map(endName), ["A", "Z", "27"]);
-  assert.deepEqual([0, 1].map((k) => shareOf(BASINS, k)), [50, 25]);
+  assert.deepEqual(
+    [0, 1].map((k) => shareOf(BASINS, k)),
+    [50, 25],
+  );
   const data = { basins: BASINS, box: { x: [0, 1], y: [0, 1] }, labels: ["y", "v"], start: [0, 0] } as const;
   assert.match(describeBasins(data), /2 by 2 cells\. A, ends at rest: 50 %; B, goes round: 25 %\./);
 });

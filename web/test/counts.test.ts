@@ -28,7 +28,10 @@ test("every point inside is counted in its pixel, none outside", () => {
   const y = many.map((k) => Math.floor(k / 200) / 20 + 0.01);
   const counts = countPoints(pointsOf([...x, -1, 11, 5, NaN, 5], [...y, 5, 5, 99, 5, NaN]), FRAME, 1);
   assert.deepEqual([counts.width, counts.height, counts.most], [100, 100, 4]);
-  assert.equal(counts.cells.reduce((sum, n) => sum + n, 0), 40_000);
+  assert.equal(
+    counts.cells.reduce((sum, n) => sum + n, 0),
+    40_000,
+  );
 });
 
 test("upwards is up, and few points are blocks that can be seen", () => {

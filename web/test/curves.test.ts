@@ -29,7 +29,10 @@ test("rests at one place are one dot", () => {
   const run = stickingRun();
   const twice = { ...run, pieces: [...run.pieces, run.pieces[1]] };
   const dwells = findDwells(twice, 0, 1, FRAME);
-  assert.deepEqual(dwells.map(({ duration }) => duration), [6]);
+  assert.deepEqual(
+    dwells.map(({ duration }) => duration),
+    [6],
+  );
 });
 
 test("the state between two points of the curve", () => {
@@ -45,7 +48,10 @@ test("a jump of the state is found, a switch without one is none", () => {
 
 test("a box holds the run, and is not changed for one that fits", () => {
   const run = stickingRun();
-  assert.deepEqual(boundsOf(run), [[1, 2], [-1, 2]]);
+  assert.deepEqual(boundsOf(run), [
+    [1, 2],
+    [-1, 2],
+  ]);
   const box = boxOf(run, [0, 1]);
   assert.ok(fits(run, [0, 1], box));
   assert.ok(!fits(run, [0, 1], { x: [1.2, 3], y: [-2, 3] }), "it leaves the box");
@@ -90,7 +96,14 @@ test("the portrait as SVG: modes in their colours, parts of the surface, the dot
     assert.ok(svg.includes(`stroke="${colour}"`), colour);
   }
   assert.ok(svg.includes(`fill="${LIGHT.colours[2]}"`), "the dot of sticking");
-  for (const text of ["attracting", "repelling", "unstable equilibrium", "stable pseudo-equilibrium", "v &lt; 0", "at rest"]) {
+  for (const text of [
+    "attracting",
+    "repelling",
+    "unstable equilibrium",
+    "stable pseudo-equilibrium",
+    "v &lt; 0",
+    "at rest",
+  ]) {
     assert.ok(svg.includes(text), text);
   }
   assert.ok(!svg.includes("NaN") && !svg.includes("undefined"));
@@ -99,13 +112,24 @@ test("the portrait as SVG: modes in their colours, parts of the surface, the dot
 
 test("the sentence of the portrait counts what is drawn", () => {
   const words = describePortrait(portraitData());
-  assert.match(words, /Phase portrait of y and v: 3 pieces in 3 modes, 2 switches, 1 of the pieces sliding; 2 equilibria/);
+  assert.match(
+    words,
+    /Phase portrait of y and v: 3 pieces in 3 modes, 2 switches, 1 of the pieces sliding; 2 equilibria/,
+  );
   assert.match(words, /starts at \(1, 2\) and ends at \(1, −1\)/);
 });
 
 test("the time series has a panel for each state, and the strip has the modes", () => {
   const run = stickingRun();
-  const data = { run, states: ["y", "v"], surfaces: ["v"], shown: [0, 1], window: [0, 5] as const, spans: spansOf(run), cursor: { t: 2, y: [2, 0] } };
+  const data = {
+    run,
+    states: ["y", "v"],
+    surfaces: ["v"],
+    shown: [0, 1],
+    window: [0, 5] as const,
+    spans: spansOf(run),
+    cursor: { t: 2, y: [2, 0] },
+  };
   const pen = new SvgPen(600, 400, () => "data:,");
   const time = drawSeries(pen, 600, 400, data, LIGHT);
   const svg = pen.toString();

@@ -19,7 +19,16 @@ test("the table of the switches, with names that need quotes", () => {
   const rows = switchesCsv(stickingRun(), ["y", 'v, "fast"']).trim().split("\n");
   assert.equal(rows[0], 't,kind,surfaces,mode_before,mode_after,y,"v, ""fast"""');
   assert.equal(rows[1], "1,enter_sliding,v,+,0,2,0");
-  assert.equal(pointsCsv(["a", "b"], [[1, 2], [3, 4.5]]), "a,b\n1,3\n2,4.5\n");
+  assert.equal(
+    pointsCsv(
+      ["a", "b"],
+      [
+        [1, 2],
+        [3, 4.5],
+      ],
+    ),
+    "a,b\n1,3\n2,4.5\n",
+  );
 });
 
 test("the script of a reference problem", () => {
@@ -33,7 +42,11 @@ test("the script of a reference problem", () => {
 });
 
 test("the script of a text, and of bytes", () => {
-  const page = { ...(FRICTION.page as object), reference: null, text: "def helper(x):\n    return x\n\ndef fall(t, x):\n    return [-1]\n" };
+  const page = {
+    ...(FRICTION.page as object),
+    reference: null,
+    text: "def helper(x):\n    return x\n\ndef fall(t, x):\n    return [-1]\n",
+  };
   const typed = toDescription({ ...FRICTION, page });
   assert.match(writeScript(typed, initialState(typed), null), /system = fl\.System\(fall, n=2\)/);
   const bytes = toDescription({ ...FRICTION, page: { ...page, text: null } });
@@ -52,7 +65,10 @@ test("numbers in Python, to the same bits", () => {
 test("a section follows the forcing, also where the frequency is swept", () => {
   const section = { by: "forcing", frequency: "omega", phase: 0.5 } as const;
   assert.deepEqual(sectionRequest(section, { omega: 2 }), { period: Math.PI, phase: 0.5 });
-  assert.deepEqual(sweptSection(section, { omega: 2 }, "omega", [1, 2]), { period: [2 * Math.PI, Math.PI], phase: 0.5 });
+  assert.deepEqual(sweptSection(section, { omega: 2 }, "omega", [1, 2]), {
+    period: [2 * Math.PI, Math.PI],
+    phase: 0.5,
+  });
   assert.deepEqual(sweptSection(section, { omega: 2 }, "F", [1, 2]), { period: Math.PI, phase: 0.5 });
 });
 
@@ -67,5 +83,8 @@ test("the reader of the text returns a model, or the place of what it cannot rea
   const model = Uint8Array.of(9, 8, 7);
   assert.deepEqual(toModel(packReply({ ok: true, kind: "read", model: toBase64(model) })), model);
   const failure = packReply({ ok: false, error: "loops are not read", line: 4, column: 5 });
-  assert.throws(() => toModel(failure), (error: TextError) => error.line === 4 && error.column === 5 && /loops/.test(error.message));
+  assert.throws(
+    () => toModel(failure),
+    (error: TextError) => error.line === 4 && error.column === 5 && /loops/.test(error.message),
+  );
 });

@@ -1,6 +1,5 @@
 /** Made-up replies and models, for tests only. */
 
-
 import type { Description } from "../src/model.ts";
 import { toDescription } from "../src/model.ts";
 import type { Run } from "../src/replies.ts";
@@ -54,7 +53,14 @@ export function stickingRun(): Run {
     ],
   };
   const t = column([0, 0.5, 1, 1, 4, 4, 5]);
-  const y = table([[1, 2], [1.6, 1], [2, 0], [2, 0], [2, 0], [1.5, 0], [1, -1]]);
+  const y = table([
+    [1, 2],
+    [1.6, 1],
+    [2, 0],
+    [2, 0],
+    [2, 0],
+    [1.5, 0],
+    [1, -1],
+  ]);
   return toRun(readReply(packReply(header, { t, y })));
 }
-

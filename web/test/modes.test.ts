@@ -19,7 +19,10 @@ test("the rank of a mode is its place among all", () => {
 });
 
 test("one surface: the colours of the Python package", () => {
-  assert.deepEqual(["+", "-", "0"].map((mode) => modeColour(mode, LIGHT.colours)), ["#0072b2", "#e69f00", "#009e73"]);
+  assert.deepEqual(
+    ["+", "-", "0"].map((mode) => modeColour(mode, LIGHT.colours)),
+    ["#0072b2", "#e69f00", "#009e73"],
+  );
 });
 
 test("regions with a common surface never have the same colour, however many surfaces there are", () => {

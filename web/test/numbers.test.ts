@@ -4,14 +4,31 @@ import { readNumber, sliderStep } from "../src/controls.ts";
 import { showBeside, showExpression, showName, showNumber } from "../src/numbers.ts";
 
 test("numbers as they are typed", () => {
-  for (const [text, value] of [["1/3", 1 / 3], ["-2,5", -2.5], ["−4", -4], ["2 pi", 2 * Math.PI], ["pi/2", Math.PI / 2], ["60π", 60 * Math.PI], ["1e-3", 1e-3], [".5", 0.5], ["+7", 7]] as const) {
+  for (const [text, value] of [
+    ["1/3", 1 / 3],
+    ["-2,5", -2.5],
+    ["−4", -4],
+    ["2 pi", 2 * Math.PI],
+    ["pi/2", Math.PI / 2],
+    ["60π", 60 * Math.PI],
+    ["1e-3", 1e-3],
+    [".5", 0.5],
+    ["+7", 7],
+  ] as const) {
     assert.equal(readNumber(text), value, text);
   }
-  for (const text of ["", "a", "1/0", "1/2/3", "1e999", "--1", "NaN", "1 2"]) assert.equal(readNumber(text), null, text);
+  for (const text of ["", "a", "1/0", "1/2/3", "1e999", "--1", "NaN", "1 2"])
+    assert.equal(readNumber(text), null, text);
 });
 
 test("a slider has some hundreds of positions, at round numbers", () => {
-  for (const range of [[0, 1.2], [-4, 4], [0, 376.99], [0, 1e-6], [-1, 0]] as const) {
+  for (const range of [
+    [0, 1.2],
+    [-4, 4],
+    [0, 376.99],
+    [0, 1e-6],
+    [-1, 0],
+  ] as const) {
     const positions = (range[1] - range[0]) / sliderStep(range);
     assert.ok(positions >= 150 && positions <= 401, `${positions}`);
   }

@@ -19,7 +19,10 @@ test("lines, with colour, width and dashes", () => {
     pen.lineTo(3.14159, 4);
     pen.stroke();
   });
-  assert.ok(svg.includes('<path d="M1 2L3.14 4" fill="none" stroke="#123456" stroke-width="2.5" stroke-dasharray="4 2"/>'), svg);
+  assert.ok(
+    svg.includes('<path d="M1 2L3.14 4" fill="none" stroke="#123456" stroke-width="2.5" stroke-dasharray="4 2"/>'),
+    svg,
+  );
 });
 
 test("a circle closes", () => {
@@ -51,7 +54,10 @@ test("texts are escaped and anchored", () => {
     pen.textAlign = "right";
     pen.fillText("a < b & c", 5, 6);
   });
-  assert.ok(svg.includes("a &lt; b &amp; c") && svg.includes('text-anchor="end"') && svg.includes('font-style="italic"'), svg);
+  assert.ok(
+    svg.includes("a &lt; b &amp; c") && svg.includes('text-anchor="end"') && svg.includes('font-style="italic"'),
+    svg,
+  );
 });
 
 test("a raster is embedded", () => {

@@ -10,8 +10,16 @@ import { Reply } from "../src/wire.ts";
 test("coarse to fine has every value once, the ends of the interval early", () => {
   const values = evenly([0, 1], 480);
   const order = coarseToFine(values);
-  assert.deepEqual([...order].sort((a, b) => a - b), values);
-  const gap = Math.max(...order.slice(0, 30).sort((a, b) => a - b).map((v, k, all) => v - (all[k - 1] ?? 0)));
+  assert.deepEqual(
+    [...order].sort((a, b) => a - b),
+    values,
+  );
+  const gap = Math.max(
+    ...order
+      .slice(0, 30)
+      .sort((a, b) => a - b)
+      .map((v, k, all) => v - (all[k - 1] ?? 0)),
+  );
   assert.ok(gap < 17 / 479 + 1e-9, `after 30 values the widest gap is ${gap}`);
 });
 
@@ -84,7 +92,14 @@ test("after a failure no further part is asked for", async () => {
     asked++;
     throw new Error("no");
   });
-  await assert.rejects(askAll([failing, failing], Array.from({ length: 50 }, () => ({ kind: "diagram" })), () => undefined), /no/);
+  await assert.rejects(
+    askAll(
+      [failing, failing],
+      Array.from({ length: 50 }, () => ({ kind: "diagram" })),
+      () => undefined,
+    ),
+    /no/,
+  );
   assert.ok(asked <= 2, `${asked} were asked for`);
 });
 
