@@ -280,11 +280,12 @@ def test_the_diagram_grows_is_stopped_and_is_refined_by_a_rectangle(open_page: A
     page.get_by_role("button", name="Stop").click()
     settle(page)
     done = front(page, "panels.get('diagram').done")
-    assert 0 < done < 480
+    total = front(page, "panels.get('diagram').total")
+    assert 0 < done < total
     page.evaluate("Object.assign(document.querySelector('#app').front.state, { skip: 5, count: 5 })")
     page.get_by_role("button", name="Draw again").click()
     settle(page)
-    assert front(page, "panels.get('diagram').points.length") == 480 * 5
+    assert front(page, "panels.get('diagram').points.length") == total * 5
     assert drawn(page, "diagram") > 0.002
     canvas = page.locator(".diagram canvas")
     canvas.scroll_into_view_if_needed()

@@ -34,6 +34,11 @@ export function drawCloud(pen: Pen, width: number, height: number, data: CloudDa
   return frame;
 }
 
+/** The columns of pixels that points fall into, of a picture so wide. */
+export function plotWidth(width: number): number {
+  return width - MARGINS.left - MARGINS.right;
+}
+
 /** The interval of all points along one axis. */
 export function spanOfPoints(values: Float64Array): Interval {
   let [low, high] = [Infinity, -Infinity];

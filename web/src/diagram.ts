@@ -2,7 +2,7 @@
 
 import type { Frame, Interval } from "./axes.ts";
 import { padded } from "./axes.ts";
-import { drawCloud, spanOfPoints, type CloudData } from "./cloud.ts";
+import { drawCloud, plotWidth, spanOfPoints, type CloudData } from "./cloud.ts";
 import { labelled, numberField } from "./controls.ts";
 import { Points } from "./counts.ts";
 import { button, make, select } from "./dom.ts";
@@ -18,7 +18,7 @@ import { toDiagramPart } from "./replies.ts";
 import { sectionFields, showSection } from "./sections.ts";
 import { chunks, coarseToFine, evenly } from "./sweep.ts";
 
-const VALUES = 480;
+const [FEWEST_VALUES, MOST_VALUES] = [200, 960];
 const CHUNK = 6;
 
 interface Window {
@@ -42,6 +42,8 @@ export class DiagramPanel implements Panel {
   private readonly job = new Job();
   private drawnFor = "";
   private done = 0;
+  /** The number of values: one for each column of pixels. */
+  private total = FEWEST_VALUES;
   private failed = new Map<number, string>();
 
   constructor(private readonly context: Context) {
@@ -187,6 +189,7 @@ export class DiagramPanel implements Panel {
     }
     this.failed.clear();
     this.done = 0;
+    this.total = Math.min(MOST_VALUES, Math.max(FEWEST_VALUES, plotWidth(this.picture.element.clientWidth)));
     this.drawnFor = this.motionKey();
     this.go.textContent = "Stop";
     this.words.textContent = "";
@@ -210,7 +213,7 @@ export class DiagramPanel implements Panel {
 
   /** Values in any order, in as many workers as there are. */
   private async scattered(signal: AbortSignal): Promise<void> {
-    const values = coarseToFine(evenly(this.context.state.range!, VALUES));
+    const values = coarseToFine(evenly(this.context.state.range!, this.total));
     const requests = chunks(values, CHUNK).map((part) => this.request(part, this.context.state.y0));
     await askAll(
       this.context.engines.many(),
@@ -224,7 +227,7 @@ export class DiagramPanel implements Panel {
   private async carried(signal: AbortSignal): Promise<void> {
     const { state, engines } = this.context;
     let start = [...state.y0];
-    for (const part of chunks(evenly(state.range!, VALUES), CHUNK)) {
+    for (const part of chunks(evenly(state.range!, this.total), CHUNK)) {
       const request = this.request(part, start);
       const found = toDiagramPart(await engines.many()[0].ask(request, signal));
       signal.throwIfAborted();
@@ -261,7 +264,7 @@ export class DiagramPanel implements Panel {
   private tell(isOver = false): void {
     const { state } = this.context;
     const parts = [
-      `${this.points.length.toLocaleString("en")} points, ${this.done} of ${VALUES} values of ${state.parameter}`,
+      `${this.points.length.toLocaleString("en")} points, ${this.done} of ${this.total} values of ${state.parameter}`,
     ];
     if (this.failed.size) parts.push(`${count(this.failed.size, "value")} without an end: ${this.firstFailure()}`);
     if (isOver && this.points.length) parts.push("drag a rectangle to look closer");
@@ -375,7 +378,7 @@ export class DiagramPanel implements Panel {
     const [low, high] = state.range ?? [0, 1];
     return (
       `Diagram of ${model.states[state.coordinate]} ${showSection(state.section)} over ${state.parameter} ` +
-      `from ${showNumber(low, 5)} to ${showNumber(high, 5)}: ${count(this.points.length, "point")}, ${this.done} of ${VALUES} values.`
+      `from ${showNumber(low, 5)} to ${showNumber(high, 5)}: ${count(this.points.length, "point")}, ${this.done} of ${this.total} values.`
     );
   }
 }
