@@ -1,20 +1,24 @@
 /** Limit cycles and their branches: computed by the kernel, shown only where there is one. */
 
 import { describeBranch, drawBranch, type BranchData } from "./branch.ts";
-import { labelled, numberField } from "./controls.ts";
+import { labelled } from "./controls.ts";
 import { button, make, select } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
-import { motionRequest, sectionRequest } from "./model.ts";
+import { motionRequest, rangeOf, sectionRequest } from "./model.ts";
 import { showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { engineFor } from "./pool.ts";
+import { coordinateField, fieldsForm, parameterField, rangeFields, sectionFields } from "./sections.ts";
 import { toBranch, toCycle, type Branch } from "./replies.ts";
 
 export class CyclesPanel implements Panel {
   readonly element: HTMLElement;
   private readonly picture: Picture;
+  private readonly findForm = fieldsForm();
+  private readonly followForm = fieldsForm();
+  private readonly canFollow: boolean;
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly branchWords = make("p", { class: "quiet", role: "status" });
   private readonly multipliers = make("p", { class: "row quiet" });
@@ -30,68 +34,52 @@ export class CyclesPanel implements Panel {
   private start: number[] | null = null;
 
   constructor(private readonly context: Context) {
-    const { model, state } = context;
+    const { model } = context;
     this.picture = new Picture(
       "branch",
       (pen, w, h, theme) => void drawBranch(pen, w, h, this.data(), theme),
       () => context.theme(),
       () => describeBranch(this.data()),
     );
-    const range = (k: 0 | 1) =>
-      numberField(k === 0 ? "from" : "to", state.range?.[k] ?? k, (value) => {
-        const next: [number, number] = [...(state.range ?? [0, 1])];
-        next[k] = value;
-        state.range = next;
-      });
-    const of = select(
-      "what is followed",
-      [
-        ["cycle", "the cycle"],
-        ["equilibrium", "the equilibrium nearby"],
-      ],
-      this.of,
-      (value) => (this.of = value as typeof this.of),
-    );
-    const parameter = select(
-      "parameter",
-      model.params.map(({ name }) => [name, showName(name)] as const),
-      state.parameter ?? "",
-      (name) => (state.parameter = name),
-    );
-    const coordinate = select(
-      "state",
-      model.states.map((name, i) => [String(i), showName(name)] as const),
-      String(state.coordinate),
-      (value) => {
-        state.coordinate = Number(value);
-        this.picture.redraw();
-      },
-    );
-    const canFollow = engineFor(context.engines, "continuation") !== null && model.params.length > 0;
+    this.canFollow = engineFor(context.engines, "continuation") !== null && model.params.length > 0;
     this.element = make(
       "div",
       { class: "panel" },
-      make("div", { class: "row" }, this.go, this.words),
+      this.findForm,
+      make("div", { class: "row" }, this.words),
       this.multipliers,
-      canFollow
-        ? make(
-            "form",
-            { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
-            labelled("follow", of),
-            labelled("over", parameter),
-            range(0),
-            range(1),
-            labelled("drawn by", coordinate),
-            this.follow,
-          )
-        : null,
+      this.canFollow ? this.followForm : null,
       this.branchWords,
-      canFollow ? this.picture.element : null,
+      this.canFollow ? this.picture.element : null,
     );
     this.picture.say("A branch is drawn here: cycles by the least and the greatest value of a state.");
   }
 
-  show(): void {}
+  show(): void {
+    const { model, state } = this.context;
+    this.findForm.replaceChildren(
+      this.go,
+      sectionFields(model, state, () => undefined),
+    );
+    if (!this.canFollow) return;
+    const followed = [
+      ["cycle", "the cycle"],
+      ["equilibrium", "the equilibrium nearby"],
+    ] as const;
+    this.followForm.replaceChildren(
+      labelled(
+        "follow",
+        select("what is followed", followed, this.of, (value) => (this.of = value as typeof this.of)),
+      ),
+      parameterField(model, state, (name) => {
+        state.range = rangeOf(model, name, state.params[name]);
+        this.show();
+      }),
+      ...rangeFields(state, (range) => (state.range = range)),
+      coordinateField("drawn by", model, state, () => this.picture.redraw()),
+      this.follow,
+    );
+  }
 
   hide(): void {}
 

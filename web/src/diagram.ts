@@ -3,19 +3,26 @@
 import type { Frame, Interval } from "./axes.ts";
 import { padded } from "./axes.ts";
 import { drawCloud, plotWidth, spanOfPoints, type CloudData } from "./cloud.ts";
-import { labelled, numberField } from "./controls.ts";
 import { Points } from "./counts.ts";
-import { button, make, select } from "./dom.ts";
+import { button, make } from "./dom.ts";
 import type { Request } from "./engine.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
 import { longSpan, motionRequest, rangeOf, sweptSection } from "./model.ts";
-import { count, showName, showNumber } from "./numbers.ts";
+import { count, showNumber } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { askAll } from "./pool.ts";
 import { toDiagramPart } from "./replies.ts";
-import { sectionFields, showSection } from "./sections.ts";
+import {
+  coordinateField,
+  fieldsForm,
+  parameterField,
+  rangeFields,
+  returnsFields,
+  sectionFields,
+  showSection,
+} from "./sections.ts";
 import { chunks, coarseToFine, evenly } from "./sweep.ts";
 
 const [FEWEST_VALUES, MOST_VALUES] = [200, 960];
@@ -29,13 +36,13 @@ interface Window {
 export class DiagramPanel implements Panel {
   readonly element: HTMLElement;
   private readonly picture: Picture;
+  private readonly form = fieldsForm();
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly go = button("Draw", () => (this.job.isRunning ? this.job.stop() : this.begin()));
   private readonly back = button("Zoom out", () => this.zoomOut());
   private readonly points = new Points();
   private readonly earlier: Window[] = [];
-  private readonly low: HTMLLabelElement;
-  private readonly high: HTMLLabelElement;
+  private ends: readonly HTMLElement[] = [];
   private up: Interval | null = null;
   private frame: Frame | null = null;
   private choice: CloudData["choice"] = null;
@@ -47,72 +54,17 @@ export class DiagramPanel implements Panel {
   private failed = new Map<number, string>();
 
   constructor(private readonly context: Context) {
-    const { model, state } = context;
     this.picture = new Picture(
       "diagram",
       (pen, w, h, theme) => void (this.frame = drawCloud(pen, w, h, this.data(), theme)),
       () => context.theme(),
       () => this.sentence(),
     );
-    const changed = () => this.begin();
-    const bound = (k: 0 | 1) =>
-      numberField(k === 0 ? "from" : "to", state.range?.[k] ?? k, (value) => {
-        const range: [number, number] = [...(state.range ?? [0, 1])];
-        range[k] = value;
-        this.setWindow({ range, up: null });
-      });
-    this.low = bound(0);
-    this.high = bound(1);
-    const parameter = select(
-      "parameter",
-      model.params.map(({ name }) => [name, showName(name)] as const),
-      state.parameter ?? "",
-      (name) => {
-        state.parameter = name;
-        this.earlier.length = 0;
-        this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
-      },
-    );
-    const coordinate = select(
-      "state",
-      model.states.map((name, i) => [String(i), showName(name)] as const),
-      String(state.coordinate),
-      (value) => {
-        state.coordinate = Number(value);
-        this.up = null;
-        changed();
-      },
-    );
-    const carry = make("input", { type: "checkbox", checked: state.carry });
-    carry.addEventListener("change", () => ((state.carry = carry.checked), changed()));
     this.back.hidden = true;
     this.element = make(
       "div",
       { class: "panel" },
-      make(
-        "form",
-        { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
-        labelled("over", parameter),
-        this.low,
-        this.high,
-        labelled("of", coordinate),
-        sectionFields(model, state, changed),
-        numberField(
-          "transient",
-          state.skip,
-          (value) => ((state.skip = Math.round(value)), changed()),
-          (value) => value >= 0,
-          "returns left out at the start",
-        ),
-        numberField(
-          "points",
-          state.count,
-          (value) => ((state.count = Math.round(value)), changed()),
-          (value) => value >= 1,
-          "returns that are drawn",
-        ),
-        make("label", { class: "check" }, carry, "start each value where the last ended"),
-      ),
+      this.form,
       make("div", { class: "row" }, this.go, this.back, this.words),
       this.picture.element,
     );
@@ -120,6 +72,7 @@ export class DiagramPanel implements Panel {
   }
 
   show(): void {
+    this.form.replaceChildren(...this.fields());
     if (this.points.length === 0 && !this.job.isRunning) this.begin();
   }
 
@@ -161,6 +114,31 @@ export class DiagramPanel implements Panel {
         name: "diagram",
         text: () => pointsCsv([state.parameter ?? "", model.states[state.coordinate]], [this.points.x, this.points.y]),
       },
+    ];
+  }
+
+  private fields(): HTMLElement[] {
+    const { model, state } = this.context;
+    const changed = () => this.begin();
+    const carry = make("input", { type: "checkbox", checked: state.carry });
+    carry.addEventListener("change", () => {
+      state.carry = carry.checked;
+      changed();
+    });
+    this.ends = rangeFields(state, (range) => this.setWindow({ range, up: null }));
+    return [
+      parameterField(model, state, (name) => {
+        this.earlier.length = 0;
+        this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
+      }),
+      ...this.ends,
+      coordinateField("of", model, state, () => {
+        this.up = null;
+        changed();
+      }),
+      sectionFields(model, state, changed),
+      ...returnsFields(state, changed),
+      make("label", { class: "check" }, carry, "start each value where the last ended"),
     ];
   }
 
@@ -282,8 +260,7 @@ export class DiagramPanel implements Panel {
     if (range[0] === range[1]) return;
     state.range = [range[0], range[1]];
     this.up = up;
-    for (const [k, label] of [this.low, this.high].entries())
-      label.querySelector("input")!.value = showPlain(range[k], range);
+    for (const [k, label] of this.ends.entries()) label.querySelector("input")!.value = showPlain(range[k], range);
     this.back.hidden = this.earlier.length === 0;
     if (isPart) this.refine();
     else this.begin();

@@ -84,6 +84,8 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
   const show: Show = async (bytes, problem, kernel = null) => {
     const engines = await makeEngines(await fetchModule(), bytes, kernel);
     const model = await describe(engines.quick);
+    const { reference } = model.page;
+    const known = problem ?? (problems.some(({ name }) => name === reference) ? reference : null);
     const openModel = (read: Uint8Array, text: string) =>
       run(async () => {
         void text;
@@ -93,7 +95,12 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
         Object.assign(element, { front: next() });
       });
     return () =>
-      mount(element, { engine: engines, model, state: fragment.view, host: { ...common, bytes, problem, openModel } });
+      mount(element, {
+        engine: engines,
+        model,
+        state: fragment.view,
+        host: { ...common, bytes, problem: known, openModel },
+      });
   };
 
   if (fragment.model) return await show(fragment.model, null);

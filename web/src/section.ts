@@ -2,7 +2,7 @@
 
 import { padded } from "./axes.ts";
 import { drawCloud, spanOfPoints, type CloudData } from "./cloud.ts";
-import { labelled, numberField } from "./controls.ts";
+import { labelled } from "./controls.ts";
 import { Points } from "./counts.ts";
 import { make, select } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
@@ -12,13 +12,14 @@ import { count, showName } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { toReturns, type Returns } from "./replies.ts";
-import { sectionFields, showSection } from "./sections.ts";
+import { fieldsForm, returnsFields, sectionFields, showSection } from "./sections.ts";
 
 const RETURN = -1; // the number of the return in place of a state
 
 export class SectionPanel implements Panel {
   readonly element: HTMLElement;
   private readonly picture: Picture;
+  private readonly form = fieldsForm();
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly latest = new Latest<null>(() => this.compute());
   private readonly points = new Points();
@@ -35,47 +36,12 @@ export class SectionPanel implements Panel {
       () => context.theme(),
       () => this.sentence(),
     );
-    const update = () => this.update();
-    const names = (k: number) => [
-      ...model.states.map((name, i) => [String(i), showName(name)] as const),
-      ...(k === 0 ? [[String(RETURN), "return"] as const] : []),
-    ];
-    const axis = (k: 0 | 1) =>
-      select(k === 0 ? "state across" : "state upwards", names(k), String(this.axes[k]), (value) => {
-        this.axes[k] = Number(value);
-        this.place();
-      });
-    this.element = make(
-      "div",
-      { class: "panel" },
-      make(
-        "form",
-        { class: "fields", onsubmit: (event: Event) => event.preventDefault() },
-        sectionFields(model, state, update),
-        numberField(
-          "transient",
-          state.skip,
-          (value) => ((state.skip = Math.round(value)), update()),
-          (value) => value >= 0,
-          "returns left out at the start",
-        ),
-        numberField(
-          "points",
-          state.count,
-          (value) => ((state.count = Math.round(value)), update()),
-          (value) => value >= 1,
-          "returns that are drawn",
-        ),
-        labelled("across", axis(0)),
-        labelled("up", axis(1)),
-      ),
-      this.words,
-      this.picture.element,
-    );
+    this.element = make("div", { class: "panel" }, this.form, this.words, this.picture.element);
   }
 
   show(): void {
     this.isShown = true;
+    this.form.replaceChildren(...this.fields());
     this.update();
   }
 
@@ -114,6 +80,25 @@ export class SectionPanel implements Panel {
     const { states } = this.context.model;
     return [
       { name: "section", text: () => pointsCsv(["t", ...states], [found.t, ...states.map((_, i) => column(i))]) },
+    ];
+  }
+
+  private fields(): HTMLElement[] {
+    const { model, state } = this.context;
+    const update = () => this.update();
+    const names = model.states.map((name, i) => [String(i), showName(name)] as const);
+    const axis = (k: 0 | 1) => {
+      const own = k === 0 ? [...names, [String(RETURN), "return"] as const] : names;
+      return select(k === 0 ? "state across" : "state upwards", own, String(this.axes[k]), (value) => {
+        this.axes[k] = Number(value);
+        this.place();
+      });
+    };
+    return [
+      sectionFields(model, state, update),
+      ...returnsFields(state, update),
+      labelled("across", axis(0)),
+      labelled("up", axis(1)),
     ];
   }
 

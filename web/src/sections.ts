@@ -1,4 +1,4 @@
-/** The choice of a section: the returns to a surface, or the ticks of a period. */
+/** The fields that places below the pictures share: the section, its returns, a parameter with its range, a state. */
 
 import { make, select } from "./dom.ts";
 import { labelled, numberField } from "./controls.ts";
@@ -34,6 +34,59 @@ export function sectionFields(model: Description, state: State, changed: () => v
   };
   build();
   return element;
+}
+
+/** How many returns are left out, and how many are drawn. */
+export function returnsFields(state: State, changed: () => void): HTMLElement[] {
+  const field = (label: string, name: "skip" | "count", least: number, title: string) => {
+    const take = (value: number) => {
+      state[name] = Math.round(value);
+      changed();
+    };
+    return numberField(label, state[name], take, (value) => value >= least, title);
+  };
+  return [
+    field("transient", "skip", 0, "returns left out at the start"),
+    field("points", "count", 1, "returns that are drawn"),
+  ];
+}
+
+export function parameterField(model: Description, state: State, changed: (name: string) => void): HTMLElement {
+  const names = model.params.map(({ name }) => [name, showName(name)] as const);
+  return labelled(
+    "over",
+    select("parameter", names, state.parameter ?? "", (name) => {
+      state.parameter = name;
+      changed(name);
+    }),
+  );
+}
+
+/** The two ends of the range of the parameter. */
+export function rangeFields(state: State, changed: (range: [number, number]) => void): [HTMLElement, HTMLElement] {
+  const field = (k: 0 | 1) =>
+    numberField(k === 0 ? "from" : "to", state.range?.[k] ?? k, (value) => {
+      const range: [number, number] = [...(state.range ?? [0, 1])];
+      range[k] = value;
+      changed(range);
+    });
+  return [field(0), field(1)];
+}
+
+export function coordinateField(label: string, model: Description, state: State, changed: () => void): HTMLElement {
+  const names = model.states.map((name, i) => [String(i), showName(name)] as const);
+  return labelled(
+    label,
+    select("state", names, String(state.coordinate), (value) => {
+      state.coordinate = Number(value);
+      changed();
+    }),
+  );
+}
+
+/** A form of fields, which are made anew when it is seen: other places may have changed what they show. */
+export function fieldsForm(): HTMLFormElement {
+  return make("form", { class: "fields", onsubmit: (event: Event) => event.preventDefault() });
 }
 
 interface Option {
