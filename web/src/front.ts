@@ -210,7 +210,8 @@ export class Front {
 
   private buildHeader(): HTMLElement {
     const { model, host } = this;
-    const title = model.page.title === host.problem ? "" : model.page.title;
+    const plain = (text: string | null) => (text ?? "").replaceAll("_", " ");
+    const title = plain(model.page.title) === plain(host.problem) ? "" : model.page.title;
     const known = host.problems.map((problem) => [problem.name, problem.title] as const);
     const isKnown = host.problem !== null && known.some(([name]) => name === host.problem);
     const own = isKnown ? [] : ([["", host.problem ?? "this model"]] as const);
