@@ -388,9 +388,12 @@ def test_light_and_dark(open_page: Any) -> None:
     assert page.evaluate(ground) == "rgb(255, 255, 255)", "what was chosen by hand stays"
 
 
-@pytest.mark.parametrize("width", [390, 768, 1400])
-def test_the_page_fits_its_window_and_canvases_have_their_real_pixels(open_page: Any, width: int) -> None:
-    page = open_page(viewport={"width": width, "height": 844}, device_scale_factor=2)
+@pytest.mark.parametrize("name", ["dry_friction", "friction_chain"])
+@pytest.mark.parametrize("width", [360, 768, 1400])
+def test_the_page_fits_its_window_and_canvases_have_their_real_pixels(
+    open_page: Any, width: int, name: str
+) -> None:
+    page = open_page(f"#p={name}", viewport={"width": width, "height": 844}, device_scale_factor=2)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     for picture in ("portrait", "series"):
         size = page.locator(f".{picture} canvas").evaluate(

@@ -36,7 +36,7 @@ export class SvgPen implements Pen {
   clips = 0;
   private readonly kept: Kept[] = [];
   private readonly body: string[] = [];
-  private readonly clipPaths: string[] = [];
+  private readonly clipPaths = new Map<string, string>();
   private path: string[] = [];
 
   /** `embed` gives the address of a raster, `data:image/png;base64,..`. */
@@ -87,8 +87,10 @@ export class SvgPen implements Pen {
   }
 
   clip(): void {
-    this.clipPaths.push(this.path.join(""));
-    this.body.push(`<g clip-path="url(#clip${this.clipPaths.length})">`);
+    const path = this.path.join("");
+    const id = `clip${hash(path)}`;
+    this.clipPaths.set(id, path);
+    this.body.push(`<g clip-path="url(#${id})">`);
     this.clips += 1;
   }
 
@@ -148,7 +150,8 @@ export class SvgPen implements Pen {
 
   /** The file. */
   toString(): string {
-    const clips = this.clipPaths.map((d, i) => `<clipPath id="clip${i + 1}"><path d="${d}"/></clipPath>`).join("");
+    const paths = [...this.clipPaths];
+    const clips = paths.map(([id, path]) => `<clipPath id="${id}"><path d="${path}"/></clipPath>`).join("");
     const open = this.clips > 0 ? "</g>".repeat(this.clips) : "";
     return (
       `<svg xmlns="http://www.w3.org/2000/svg" width="${this.width}" height="${this.height}" ` +
@@ -160,6 +163,13 @@ export class SvgPen implements Pen {
     const alpha = this.globalAlpha < 1 ? ` opacity="${short(this.globalAlpha)}"` : "";
     this.body.push(start + alpha + end);
   }
+}
+
+/** A name that is the same for the same path only: several files may stand in one page. */
+function hash(text: string): string {
+  let value = 0;
+  for (const letter of text) value = (Math.imul(value, 31) + letter.charCodeAt(0)) | 0;
+  return (value >>> 0).toString(36);
 }
 
 function short(value: number): string {

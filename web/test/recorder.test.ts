@@ -45,7 +45,8 @@ test("what is saved comes back, and groups of clips close with it", () => {
     pen.fillRect(1, 1, 2, 2);
   });
   assert.ok(svg.includes("</g>\n<rect") && svg.includes('fill="red"'));
-  assert.ok(svg.includes('<clipPath id="clip1"><path d="M0 0h10v10h-10Z"/></clipPath>'));
+  const [, id] = /<clipPath id="(\w+)"><path d="M0 0h10v10h-10Z"\/><\/clipPath>/.exec(svg) ?? [];
+  assert.ok(id && svg.includes(`clip-path="url(#${id})"`), svg);
 });
 
 test("texts are escaped and anchored", () => {
@@ -63,4 +64,16 @@ test("texts are escaped and anchored", () => {
 test("a raster is embedded", () => {
   const svg = drawn((pen) => pen.raster({ width: 3, height: 2, pixels: new Uint8ClampedArray(24) }, 1, 2, 30, 20));
   assert.ok(svg.includes('href="data:test,3x2"'));
+});
+
+test("files that stand in one page do not take each other's clips", () => {
+  const clipped = (size: number) =>
+    drawn((pen) => {
+      pen.beginPath();
+      pen.rect(0, 0, size, size);
+      pen.clip();
+    });
+  const id = (svg: string) => /clipPath id="(\w+)"/.exec(svg)?.[1];
+  assert.notEqual(id(clipped(10)), id(clipped(11)));
+  assert.equal(id(clipped(10)), id(clipped(10)));
 });
