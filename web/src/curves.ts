@@ -38,28 +38,50 @@ export interface Dwell {
 }
 
 const RESTING = 2; // pixels
+const SLOW = 0.2; // of the mean speed of the run
 const SAME_PLACE = 3;
 
-/** The pieces of sliding that are points on the screen; those at the same place are one, with the sum of the times. */
+/**
+ * The pieces of sliding that are points on the screen although they last; those at the same place are one, with the
+ * sum of the times. A piece that is short because it is over soon is none.
+ */
 export function findDwells(run: Run, i: number, j: number, frame: Frame): Dwell[] {
   const found = new Map<string, Dwell>();
-  for (const piece of run.pieces) {
-    if (!isSliding(piece.mode)) continue;
-    const duration = run.t[piece.last] - run.t[piece.first];
-    let [left, right, top, bottom] = [Infinity, -Infinity, Infinity, -Infinity];
-    for (let row = piece.first; row <= piece.last; row++) {
-      const x = frame.x.at(coordinate(run, row, i));
-      const y = frame.y.at(coordinate(run, row, j));
-      [left, right] = [Math.min(left, x), Math.max(right, x)];
-      [top, bottom] = [Math.min(top, y), Math.max(bottom, y)];
-    }
-    if (!(duration > 0) || !(right - left < RESTING) || !(bottom - top < RESTING)) continue;
-    const [x, y] = [0.5 * (left + right), 0.5 * (top + bottom)];
-    const key = `${piece.mode} ${Math.round(x / SAME_PLACE)} ${Math.round(y / SAME_PLACE)}`;
+  const paths = run.pieces.map((piece) => measure(run, piece, i, j, frame));
+  const whole = paths.reduce((sum, { duration }) => sum + duration, 0);
+  const speed = whole > 0 ? paths.reduce((sum, { length }) => sum + length, 0) / whole : 0;
+  run.pieces.forEach(({ mode }, k) => {
+    const { x, y, width, height, length, duration } = paths[k];
+    if (!isSliding(mode) || !(duration > 0) || !(width < RESTING) || !(height < RESTING)) return;
+    if (length > SLOW * speed * duration) return;
+    const key = `${mode} ${Math.round(x / SAME_PLACE)} ${Math.round(y / SAME_PLACE)}`;
     const known = found.get(key);
-    found.set(key, known ? { ...known, duration: known.duration + duration } : { x, y, duration, mode: piece.mode });
-  }
+    found.set(key, known ? { ...known, duration: known.duration + duration } : { x, y, duration, mode });
+  });
   return [...found.values()];
+}
+
+/** The middle, the extent and the length of a piece on the screen, and its duration. */
+function measure(run: Run, piece: Piece, i: number, j: number, frame: Frame) {
+  let [left, right, top, bottom, length] = [Infinity, -Infinity, Infinity, -Infinity, 0];
+  let [lastX, lastY] = [NaN, NaN];
+  for (let row = piece.first; row <= piece.last; row++) {
+    const x = frame.x.at(coordinate(run, row, i));
+    const y = frame.y.at(coordinate(run, row, j));
+    [left, right] = [Math.min(left, x), Math.max(right, x)];
+    [top, bottom] = [Math.min(top, y), Math.max(bottom, y)];
+    if (row > piece.first) length += Math.hypot(x - lastX, y - lastY);
+    [lastX, lastY] = [x, y];
+  }
+  const duration = Math.abs(run.t[piece.last] - run.t[piece.first]);
+  return {
+    x: 0.5 * (left + right),
+    y: 0.5 * (top + bottom),
+    width: right - left,
+    height: bottom - top,
+    length,
+    duration,
+  };
 }
 
 const SMALLEST_DOT = 2.5;

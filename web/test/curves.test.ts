@@ -19,6 +19,15 @@ test("sticking is one dot at its place, with its duration", () => {
   assert.ok(Math.abs(dwells[0].x - FRAME.x.at(2)) < 1e-9 && Math.abs(dwells[0].y - FRAME.y.at(0)) < 1e-9);
 });
 
+test("a piece of sliding that is over soon is no rest, and a slow one is", () => {
+  const run = stickingRun();
+  const moving = { ...run, t: Float64Array.from([0, 0.5, 1, 1, 1.001, 1.001, 2]), y: run.y.slice() };
+  moving.y[8] = 2.003; // moves a little in a very short time
+  assert.deepEqual(findDwells(moving, 0, 1, FRAME), []);
+  const slow = { ...moving, t: run.t };
+  assert.equal(findDwells(slow, 0, 1, FRAME).length, 1);
+});
+
 test("the area of a dot is its share of the run", () => {
   const ratio = dwellRadius(4, 10) / dwellRadius(1, 10);
   assert.ok(Math.abs(ratio - 2) < 1e-12);
