@@ -380,7 +380,7 @@ def _solve(
                     run, used = beyond, ended
         has_events = specs is not None
         solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
-        if wanted is not None:
+        if specs or wanted is not None:
             solution._origin = solution._origin._replace(events=tuple(specs or ()), args=constants)
         return solution
 
