@@ -76,6 +76,7 @@ def diagram(ax, quick: bool) -> None:
         ax.text(1 / omega, start[1] + 0.2, name, ha="center")
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     figure, axes = pyplot.subplots(4, 1, figsize=(8.0, 11.4), layout="constrained")
     diagram(axes[0], quick)
@@ -94,6 +95,7 @@ def main(path: Path, quick: bool) -> None:
         twice = oscillator.solve((0.0, 2 * period), start, omega=omega)
         twice.plot(ax=ax)
         ax.set_title(f"{name}: 1/omega = {1 / omega:g}", loc="left", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -29,6 +29,7 @@ CYCLES = {
 }
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
     numbers = {}
@@ -57,6 +58,7 @@ def main(path: Path) -> None:
     left.legend(frameon=False)
     left.set(xlabel="x1, twist", ylabel="x3, speed of the lower disc")
     right.set(xlabel="x1", xlim=(-2.5, 2.5), ylim=(-1.0, 2.0), title="sticking is drawn heavier")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

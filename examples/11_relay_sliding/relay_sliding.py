@@ -25,6 +25,7 @@ problem = fl.problems.get("relay_feedback")
 relay = fl.System(rhs, n=3, args=problem.args, states=("y1", "y2", "y3"))
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = relay.solve(problem.t_span, problem.y0, rtol=1e-12, atol=1e-12)
     phases = [segment for segment in solution.segments if segment.mode.is_sliding]
@@ -47,6 +48,7 @@ def main(path: Path) -> None:
     space.get_legend().remove()
     fl.plot.phase(solution, "y1", "y3", ax=figure.add_subplot(grid[1]))
     space.set_yticks(np.arange(-1.0, 1.1))
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

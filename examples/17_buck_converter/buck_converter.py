@@ -85,6 +85,7 @@ def period_doubling(ax, quick: bool) -> None:
     assert 24.0 < doubled < 25.0  # 24.5 V in the literature
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     instant, state = periodic_motion(20.0)
     solution = late(20.0, 5)
@@ -107,6 +108,7 @@ def main(path: Path, quick: bool) -> None:
         for line in ax.lines:
             line.set_linewidth(0.8)
     period_doubling(bottom, quick)
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -26,6 +26,7 @@ control = fl.problems.get("sliding_mode_control").system()
 STRENGTH, RATE = 2.0, 1.5
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = control.solve((0.0, 8.0), [1.0, 0.0], rtol=1e-11, atol=1e-13)
     (reached,) = solution.switches
@@ -51,6 +52,7 @@ def main(path: Path) -> None:
     top.text(3.9, 0.86, "disturbance, from the multiplier", fontsize="small", ha="center")
     weak.plot(ax=bottom)
     bottom.set_title("K = 0.75 is too weak", loc="left", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -41,6 +41,7 @@ hit = fl.Reset(
 shaken = fl.System(lambda t, x: [x[1], -GRAVITY], n=2, states=("y", "v"), resets=hit)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = fl.problems.get("bouncing_ball").solve()
     impacts = solution.switches.t[solution.switches.kind == "reset"]
@@ -66,6 +67,7 @@ def main(path: Path) -> None:
     t = np.linspace(0.0, 4.0, 2000)
     bottom.plot(t, table(t), color="0.6", linewidth=0.8, zorder=0)
     bottom.set_title("on a table that shakes", loc="left", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -49,6 +49,7 @@ def time_to_border(start: np.ndarray, k: float, eps: float) -> float:
     return middle
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     eps = -0.01
     solution = ocean.solve((0.0, 60.0), [0.5, 0.2], rtol=1e-11, atol=1e-12)
@@ -77,6 +78,7 @@ def main(path: Path) -> None:
         ax.set(xlim=(0.3, 1.05), ylim=(0.1, 1.0), title=f"eps = {value}")
     for ax in (left, right):
         ax.get_legend().set(loc="upper left", bbox_to_anchor=(0.0, 1.0))
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

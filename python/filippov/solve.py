@@ -435,6 +435,7 @@ def _report_end(report: Report, run: AnyRun, solution: Solution) -> None:
     if report.error is None and run.reason != "interrupted" and len(run.t):
         with suppress(BaseException):
             report(float(run.t[-1]))
+    report.close()
     error: Any = report.error
     if isinstance(error, KeyboardInterrupt):
         raise Interrupted(run.message or "interrupted", partial=solution) from error
