@@ -41,7 +41,8 @@ def test_the_plain_line_has_share_rate_and_time_left(
     bar = Bar(200, "points", "sweep", done=40)
     now[0] += 10.0
     bar.to(90, "3 failed")
-    expected = "sweep: [##########              ]  45.0 % 90 of 200 points, 5/s, 0:00:10 gone, 0:00:22 left, 3 failed"
+    numbers = "90 of 200 points, 5/s, 0:00:10 gone, 0:00:22 left, 3 failed"
+    expected = f"sweep: [{'#' * 10}{' ' * 14}]  45.0 % {numbers}"
     assert bar.text() == expected
     now[0] += 0.05
     bar.to(95)

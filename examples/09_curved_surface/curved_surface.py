@@ -50,7 +50,7 @@ def main(path: Path) -> None:
     numbers |= {f"y1 where it leaves, {k}": (switch.y_before[0], 1.0) for k, switch in enumerate(leaves)}
     print(compare(numbers))
     figure, (left, right) = pyplot.subplots(
-        1, 2, figsize=(10.4, 4.4), width_ratios=(1.35, 1.0), layout="constrained"
+        1, 2, figsize=(11.4, 4.4), width_ratios=(1.35, 1.0), layout="constrained"
     )
     fl.plot.surface(fl.surface_parts(planar, [(-1.3, 1.6), (-2.2, 1.6)], points=161), ax=left, legend=False)
     fl.plot.phase(solution, ax=left, legend=False)
@@ -58,7 +58,7 @@ def main(path: Path) -> None:
         fl.surface_parts(planar, [(-1.3, 1.6), (-2.2, 1.6)], points=161), ax=left, legend="lower right"
     )
     left.set(xlabel="y1", ylabel="y2", title="the motion and the surface")
-    fl.plot.time_series(solution, states="distance", ax=right, legend="upper right")
+    fl.plot.time_series(solution, states="distance", ax=right)
     sliding = switches.t[1]
     near = solution.evaluate(distance, np.linspace(switches.t[0], sliding, 400))
     print(f"largest distance between crossing and sliding: {np.abs(near).max():.3e}")

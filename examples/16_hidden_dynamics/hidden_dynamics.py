@@ -126,7 +126,8 @@ def draw_fold(ax, name: str) -> None:
             ],
             n=2,
         )
-        fl.plot.phase(gap.solve((0.0, 300.0), [0.0, 0.0]), ax=ax, label="what follows", legend=False)
+        motion = gap.solve((0.0, 300.0), [0.0, 0.0])
+        ax.plot(*motion.sol(np.linspace(0.0, 300.0, 3000)), color="#D55E00", linewidth=1.4, zorder=4)
         title = f"{name}: to {follows}"
     ax.set(title=title, xlabel="", ylabel="")
 
@@ -171,7 +172,7 @@ def main(path: Path, quick: bool) -> None:
     entries = [
         {"color": colours[0], "label": "$g_1 = 0$"},
         {"color": colours[1], "linestyle": "--", "label": "$g_2 = 0$"},
-        {"color": colours[0], "linewidth": 2.4, "label": "what follows (a1 to c2)"},
+        {"color": colours[2], "linewidth": 2.4, "label": "what `classify` follows"},
         {"color": "#D55E00", "label": "regularised motions"},
         {"color": "k", "marker": "o", "linestyle": "none", "label": "rest point, attracts"},
         {

@@ -102,8 +102,7 @@ def main(path: Path, quick: bool) -> None:
         run = late(E, periods)
         ticks = np.unique(run.sol(PERIOD * np.arange(periods))[0].round(6))
         print(f"E = {E:g} V: {len(ticks)} different voltages at {periods} ticks")
-        fl.plot.phase(run, "v", "i", ax=ax)
-        ax.get_legend().remove()
+        fl.plot.phase(run, "v", "i", ax=ax, legend=False, units={"v": "V", "i": "A"})
         ax.set_title(f"E = {E:g} V")
         for line in ax.lines:
             line.set_linewidth(0.8)

@@ -95,8 +95,8 @@ def solve(given: argparse.Namespace) -> int:
             raise Mistake(f"--phase: two or three states are needed, not {len(given.phase)}")
     else:
         check_needs(given, ("phase", "states", "dark"), "--plot, the name of a picture")
-    if given.csv is None and given.parquet is None:
-        check_needs(given, ("points",), "--csv or --parquet, where the times are written")
+    if given.csv is None and given.parquet is None and given.json is None:
+        check_needs(given, ("points",), "--csv, --json or --parquet, where the times are written")
     if given.parquet == STDOUT:
         raise Mistake("--parquet: the name of a file is needed; --csv - writes to the standard output")
     check_targets(given.plot, given.csv, given.parquet, given.json)

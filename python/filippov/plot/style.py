@@ -281,7 +281,8 @@ def mode_title(surfaces: Sequence[str]) -> str | None:
     is_short = all(len(name) <= _MOST_LETTERS for name in surfaces)
     if not surfaces or len(surfaces) > _MOST_SURFACES_NAMED or not is_short:
         return None
-    return "signs of " + ",\n".join(surfaces)
+    together = ", ".join(surfaces)
+    return "signs of " + (together if len(together) <= _MOST_LETTERS else ",\n".join(surfaces))
 
 
 def draw_legend(
