@@ -56,7 +56,7 @@ class View:
     def _refined(self) -> Polyline:
         ax, track = self.ax, self.track
         dpi = float(ax.figure.dpi)
-        window = np.sort(ax.transData.transform(np.column_stack([ax.get_xlim(), ax.get_ylim()])), axis=0)
+        window = np.array(ax.bbox.get_points())
         window += np.array([[-1.0], [1.0]]) * 0.1 * dpi  # a heavy line reaches in from outside
         near = min(_NEAR * dpi, 0.3)
         if hasattr(ax, "get_proj"):
