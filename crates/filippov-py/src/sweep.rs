@@ -17,7 +17,7 @@ use crate::prepared_run::{ActionRow, PreparedRun};
 use crate::run::{is_interruption, take_error};
 use crate::solve::RunOptions;
 use crate::systems::TracedSystem;
-use crate::threads::{on_threads, CHUNK_PER_THREAD};
+use crate::threads::{on_threads, Report, CHUNK_PER_THREAD};
 
 type Outcome = Result<Solution, Error>;
 
@@ -70,7 +70,11 @@ pub fn solve_points<'py>(
             }
         };
         let is_last = |outcome: &Outcome| outcome.as_ref().is_ok_and(is_interruption);
-        let done = py.detach(|| on_threads(&jobs, threads, go, is_last));
+        let report = Report {
+            function: options.progress.as_ref(),
+            before: points.status.len(),
+        };
+        let done = py.detach(|| on_threads(&jobs, threads, &report, go, is_last));
         for (((run, _, span), outcome), row) in jobs.iter().zip(done.results).zip(chunk) {
             let signals = Signals {
                 outputs: &outputs,

@@ -10,7 +10,7 @@ from filippov._core import __version__
 from filippov.cli import commands
 from filippov.cli.exploring import add_app_options, app
 from filippov.cli.following import add_continue_options, add_cycle_options, continue_, cycle
-from filippov.cli.solving import add_run_options
+from filippov.cli.solving import add_run_options, complete_problem
 from filippov.cli.sweeping import add_sweep_options, sweep
 
 __all__ = ["build_parser"]
@@ -77,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_cycle(subparsers)
     _add_continue(subparsers)
     _add_app(subparsers)
+    _add_completion(subparsers)
     return parser
 
 
@@ -87,6 +88,7 @@ def _add_list(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -
         description="Name the reference problems, with what happens in them.",
     )
     command.add_argument("text", nargs="?", default="", help="only those with this in their name or note")
+    command.add_argument("--json", action="store_true", help="print names and notes as JSON")
     command.set_defaults(run=commands.list_problems)
 
 
@@ -96,7 +98,8 @@ def _add_demo(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -
         help="solve a reference problem and draw it",
         description="Solve a reference problem: print where it comes from and what happened, and draw it.",
     )
-    command.add_argument("name", metavar="NAME", help="as `filippov list` has it")
+    name = command.add_argument("name", metavar="NAME", help="as `filippov list` has it")
+    name.completer = complete_problem  # type: ignore[attr-defined]
     command.add_argument("--plot", type=Path, metavar="FILE", help="the picture; NAME.png by default")
     command.add_argument("--no-plot", action="store_true", help="draw nothing")
     command.add_argument("--dark", action="store_true", help="light lines on a dark ground")
@@ -140,9 +143,29 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     out.add_argument("--dark", action="store_true", help="light lines on a dark ground")
     out.add_argument("--csv", type=Path, metavar="FILE", help="write times, states and modes; - prints them")
     out.add_argument("--parquet", type=Path, metavar="FILE", help="write them for pandas, Polars, DuckDB")
+    out.add_argument("--json", type=Path, metavar="FILE", help="write all of it as JSON; - prints it")
     out.add_argument("--points", type=int, metavar="N", help="write N equidistant times")
     out.add_argument("--quiet", action="store_true", help="print nothing but warnings and failures")
     command.set_defaults(run=commands.solve)
+
+
+_COMPLETION = """\
+  eval "$(filippov completion bash)"        in ~/.bashrc
+  eval "$(filippov completion zsh)"         in ~/.zshrc, after compinit
+  filippov completion fish | source         in ~/.config/fish/config.fish
+"""
+
+
+def _add_completion(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "completion",
+        help="make the shell complete commands, options and problems",
+        description="Print the lines that make a shell complete commands, options and names of problems.",
+        epilog=_COMPLETION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument("shell", choices=("bash", "zsh", "fish", "tcsh", "powershell"))
+    command.set_defaults(run=commands.print_completion)
 
 
 _SWEEP = """\
@@ -155,6 +178,7 @@ START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations 
 or with a surface as --section, the returns on the attractor are kept, else the state at the end.
 With --store every finished chunk is written at once. A sweep that was stopped, also by kill -9 or by a power
 cut, goes on when the same command is given again; nothing is done twice, the result is the same to the bit.
+Without --csv, --json, --plot and --store the table is printed.
 """
 
 
