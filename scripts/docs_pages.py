@@ -1,14 +1,20 @@
-"""Pages of the documentation that are made when it is built: gallery, pictures, pages from the root.
+"""Pages of the documentation that are made when it is built: gallery, pictures, notebooks, pages from the root.
 
-A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; where one fails,
-or prints something else than the page says, the build fails.
+A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; if one fails, or
+prints something else than the page says, the build fails. What a script or a page produced is kept in
+`target/docs-cache` until it or the package changes. With `FILIPPOV_DOCS=text` in the environment
+(`make docs-text`) nothing is run: pictures are those that were kept, or blank.
 """
 
 from __future__ import annotations
 
 import ast
+import base64
+import functools
+import hashlib
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,10 +26,36 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from docs_notebooks import notebook  # noqa: E402
+
+CACHE = ROOT / "target" / "docs-cache"
+TEXT_ONLY = os.environ.get("FILIPPOV_DOCS") == "text"
 EXAMPLES = ROOT / "examples"
 RUN_FOLDERS = ("tutorial", "howto", "compare")
-# Pages of the root of the repository that the documentation has too.
+# Pages of the repository that the documentation has too.
 FROM_ROOT = {f"{name.upper()}.md": f"{name}.md" for name in ("architecture", "changelog", "contributing")}
+FROM_ROOT |= {"benchmarks/README.md": "benchmarks.md"}
+# The gallery by fields; an example that is not named here comes last.
+FIELDS = {
+    "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks two_masses
+        stick_slip_cycle bouncing_ball structural_pounding""",
+    "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order thermostat""",
+    "Power electronics": "buck_converter rectifier",
+    "Biology, climate": "gene_network neuron ocean",
+    "Surfaces and where they meet": "plane_and_quadric hidden_dynamics curved_surface",
+    "Cycles and branches": """friction_branch belt_branch drill_string_branch impact_oscillator converter_doubling
+        harvested_predators""",
+    "Derivatives, identification, optimisation": """ball_of_states stribeck_identification converter_switching
+        relay_tuning""",
+}
+_FIGURE = re.compile(r"^!\[(?P<caption>[^]]*)\]\((?P<source>figures/\w+)\.svg\)$", re.MULTILINE)
+# Colours of a figure on a light page, and on a dark one.
+DARK = {"#000000": "#e8edf2", "#ffffff": "#1e2129", "#555555": "#b4bcc4", "#bbbbbb": "#56606a", "#0072b2": "#56b4e9"}
+_BLANK = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
 _LINK = re.compile(r"\[(?P<text>[^]\n]*)\]\((?P<target>(?!https?:|#)[^)\s]+)\)")
 
 
@@ -34,16 +66,18 @@ def on_files(files: Any, config: Any) -> Any:
         files.append(File.generated(config, target, content=(ROOT / name).read_text(encoding="utf-8")))
     jobs = [*sorted(EXAMPLES.glob("*/*.py")), *_pages_to_run(docs)]
     with ThreadPoolExecutor(max_workers=2) as pool:
-        made = list(pool.map(lambda job: _example(job) if job.suffix == ".py" else _page(job, docs), jobs))
+        made = list(pool.map(lambda job: _produced(job, docs), jobs))
     for job, produced in zip(jobs, made, strict=True):
         for name, content in produced.items():
             files.append(File.generated(config, name, content=content))
-        if job.suffix == ".py":
-            _gallery_entries(config).append({_title(job): f"gallery/{job.stem}.md"})
-    overview = "gallery/index.md"
-    scripts = [job for job in jobs if job.suffix == ".py"]
-    files.append(File.generated(config, overview, content=_overview(scripts)))
-    _gallery_entries(config).insert(0, overview)
+    scripts = {job.stem: job for job in jobs if job.suffix == ".py"}
+    _add_gallery(files, config, scripts)
+    for page in sorted((docs / "tutorial").glob("*.md")):
+        content = notebook(page.read_text(encoding="utf-8"))
+        files.append(File.generated(config, f"tutorial/{_notebook_name(page.stem)}", content=content))
+    for figure in sorted(docs.glob("*/figures/*.svg")):
+        name = figure.relative_to(docs).with_suffix(".dark.svg").as_posix()
+        files.append(File.generated(config, name, content=_dark(figure.read_text(encoding="utf-8"))))
     _replace(config.nav, "decisions", _decisions(docs))
     _complete(config.nav, docs)
     return files
@@ -52,6 +86,10 @@ def on_files(files: Any, config: Any) -> Any:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Let links written for the repository lead to the pages made of what they name."""
     here = page.file.src_uri
+    if here.startswith("tutorial/"):
+        link = f"[Download this page as a notebook]({_notebook_name(Path(here).stem)}){{ .md-button }}"
+        markdown = f"{markdown.rstrip()}\n\n{link}\n"
+    markdown = _FIGURE.sub(_figure, markdown)
     original = {target: ROOT / name for name, target in FROM_ROOT.items()}.get(here, ROOT / "docs" / here)
 
     def renewed(match: re.Match[str]) -> str:
@@ -71,6 +109,8 @@ def _page_of(path: Path) -> str | None:
         return FROM_ROOT[path.name]
     if path == EXAMPLES / "README.md":
         return "gallery/index.md"
+    if path == ROOT / "benchmarks" or path == ROOT / "benchmarks" / "README.md":
+        return FROM_ROOT["benchmarks/README.md"]
     if path.is_relative_to(EXAMPLES) and path.suffix == ".py" and path.is_file():
         return f"gallery/{path.stem}.md"
     docs = ROOT / "docs"
@@ -100,7 +140,45 @@ def _run(arguments: list[str], what: Path) -> str:
     return done.stdout
 
 
-def _page(page: Path, docs: Path) -> dict[str, bytes]:
+@functools.cache
+def _state_of_the_package() -> str:
+    """Return a digest of all that an example or a page may use: sources of the package, and the core."""
+    found = hashlib.sha256()
+    package = ROOT / "python" / "filippov"
+    for path in sorted([*package.rglob("*.py"), *package.glob("_core*"), ROOT / "scripts" / "readme_blocks.py"]):
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def _produced(job: Path, docs: Path) -> dict[str, str | bytes]:
+    """Return the files that an example or a page with code makes, from the cache if nothing has changed."""
+    kept = CACHE / job.relative_to(ROOT).as_posix().replace("/", "-")
+    key = hashlib.sha256(job.read_bytes() + _state_of_the_package().encode()).hexdigest()
+    mark = kept / "key"
+    if not (mark.is_file() and (TEXT_ONLY or mark.read_text() == key)):
+        if TEXT_ONLY:
+            return _blank(job, docs)
+        made = _example(job) if job.suffix == ".py" else _page(job, docs)
+        shutil.rmtree(kept, ignore_errors=True)
+        for name, content in made.items():
+            path = kept / "files" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+        kept.mkdir(parents=True, exist_ok=True)
+        mark.write_text(key)
+    files = kept / "files"
+    return {path.relative_to(files).as_posix(): path.read_bytes() for path in files.rglob("*.*")}
+
+
+def _blank(job: Path, docs: Path) -> dict[str, str | bytes]:
+    """Return what stands for the files of a job that was never run."""
+    if job.suffix == ".py":
+        return {f"gallery/{job.stem}.md": _example_page(job, "(not run)"), f"gallery/{job.stem}.png": _BLANK}
+    shown = re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", job.read_text(encoding="utf-8"))
+    return {(job.parent.relative_to(docs) / name).as_posix(): _BLANK for name in shown}
+
+
+def _page(page: Path, docs: Path) -> dict[str, str | bytes]:
     """Run the code of a page; return the pictures that it draws, to stand beside it."""
     with tempfile.TemporaryDirectory() as folder:
         _run([str(ROOT / "scripts" / "readme_blocks.py"), str(page), folder], page)
@@ -130,6 +208,7 @@ def _example_page(script: Path, printed: str) -> str:
     title, *rest = _words(script)
     code = script.read_text(encoding="utf-8").split('"""', 2)[2].strip()
     parts = [f"# {_title(script)}", title, *rest, f"![{_title(script)}]({script.stem}.png)"]
+    parts += [f"[Download the script]({script.name}){{ .md-button }}"]
     parts += ["## The numbers", f"```text\n{printed.rstrip()}\n```", "## The code", f"```python\n{code}\n```"]
     for module in _problem_modules(code):
         source = (ROOT / "python" / "filippov" / "problems" / f"{module}.py").read_text(encoding="utf-8")
@@ -146,29 +225,54 @@ def _problem_modules(code: str) -> list[str]:
     return list(dict.fromkeys([*imported, *(module for module in owners if module)]))
 
 
-def _overview(scripts: list[Path]) -> str:
+def _add_gallery(files: Any, config: Any, scripts: dict[str, Path]) -> None:
+    """Add the overview of the gallery, its scripts, and its part of the navigation, by fields."""
+    fields = {field: names.split() for field, names in FIELDS.items()}
+    named = {name for names in fields.values() for name in names}
+    fields["More"] = [name for name in scripts if name not in named]
     lines = [
         "# Gallery",
-        "Every page has the problem in words, the picture, the numbers beside their references, and the "
-        "code. Where a number is off, the example fails, and with it the tests.",
+        "Each page has the problem in words, the picture, the numbers beside their references, and the script to "
+        "download. If a number is off, the example fails, and with it the tests.",
     ]
-    for script in scripts:
-        title, *_ = _words(script)
-        lines.append(
-            f"[![{_title(script)}]({script.stem}.png){{ width=320 align=left }}]({script.stem}.md)\n"
-            f"**[{_title(script)}]({script.stem}.md)** — {' '.join(title.split())}\n\n"
-            '<div style="clear: both"></div>'
-        )
-    return "\n\n".join(lines) + "\n"
+    entries: list[Any] = ["gallery/index.md"]
+    for field, names in fields.items():
+        if there := [scripts[name] for name in names if name in scripts]:
+            lines += [f"## {field}", '<div class="cards pictures">', *map(_card, there), "</div>"]
+            entries.append({field: [{_title(script): f"gallery/{script.stem}.md"} for script in there]})
+    files.append(File.generated(config, "gallery/index.md", content="\n\n".join(lines) + "\n"))
+    for script in scripts.values():
+        content = script.read_text(encoding="utf-8")
+        files.append(File.generated(config, f"gallery/{script.name}", content=content))
+    for section in config.nav:
+        if "Gallery" in section:
+            section["Gallery"] = entries
 
 
-def _gallery_entries(config: Any) -> list[Any]:
-    """Return the list of the gallery in the navigation, made at the first call."""
-    found = [entry for entry in config.nav if "Gallery" in entry]
-    if not isinstance(found[0]["Gallery"], list):
-        found[0]["Gallery"] = []
-    entries: list[Any] = found[0]["Gallery"]
-    return entries
+def _card(script: Path) -> str:
+    title, *_ = _words(script)
+    return (
+        f'<a href="{script.stem}.html"><img src="{script.stem}.png" alt="" loading="lazy">'
+        f"<b>{_title(script)}</b><span>{' '.join(title.split())}</span></a>"
+    )
+
+
+def _notebook_name(stem: str) -> str:
+    return f"filippov_{'start' if stem == 'index' else stem}.ipynb"
+
+
+def _figure(match: re.Match[str]) -> str:
+    """Return a figure of the project in both colours, with its caption."""
+    alternative = re.sub(r"[$\\{}*`]", "", match["caption"])
+    pictures = "".join(
+        f"![{alternative}]({match['source']}{suffix}.svg#only-{ground})"
+        for suffix, ground in (("", "light"), (".dark", "dark"))
+    )
+    return f'<figure class="drawn" markdown="span">\n{pictures}\n<figcaption>{match["caption"]}</figcaption>\n</figure>'
+
+
+def _dark(svg: str) -> str:
+    return re.sub("|".join(DARK), lambda match: DARK[match[0]], svg)
 
 
 def _decisions(docs: Path) -> list[Any]:
