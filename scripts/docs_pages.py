@@ -34,6 +34,7 @@ CACHE = ROOT / "target" / "docs-cache"
 TEXT_ONLY = os.environ.get("FILIPPOV_DOCS") == "text"
 EXAMPLES = ROOT / "examples"
 RUN_FOLDERS = ("tutorial", "howto", "compare")
+RUN_PAGES = ("start.md",)
 # Pages of the repository that the documentation has too.
 FROM_ROOT = {f"{name.upper()}.md": f"{name}.md" for name in ("architecture", "changelog", "contributing")}
 FROM_ROOT |= {"benchmarks/README.md": "benchmarks.md"}
@@ -123,7 +124,8 @@ def _page_of(path: Path) -> str | None:
 
 
 def _pages_to_run(docs: Path) -> list[Path]:
-    return [page for folder in RUN_FOLDERS for page in sorted((docs / folder).glob("*.md"))]
+    in_folders = [page for folder in RUN_FOLDERS for page in sorted((docs / folder).glob("*.md"))]
+    return [*(docs / name for name in RUN_PAGES), *in_folders]
 
 
 def _environment() -> dict[str, str]:
