@@ -1,4 +1,4 @@
-"""Formulas of the documentation become MathML when it is built: no script and no network is needed to read them.
+"""Formulas become MathML when the documentation is built: no script and no network is needed to read them.
 
 A hook of MkDocs (`mkdocs.yml`). `pymdownx.arithmatex` finds `$...$` and `$$...$$`; a formula that cannot be
 read fails the build.

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 
-_PARTS = re.compile(r"^(?:<!-- [^\n]* -->\n)*```(?P<kind>python|text)\n(?P<code>.*?)^```\n?", re.MULTILINE | re.DOTALL)
+_PARTS = re.compile(
+    r"^(?:<!-- [^\n]* -->\n)*```(?P<kind>python|text)\n(?P<code>.*?)^```\n?", re.MULTILINE | re.DOTALL
+)
 _LINK = re.compile(r"(?<!!)\[([^]\n]*)\]\((?!https?:)[^)\s]+\)")
 _PICTURE = re.compile(r"^!\[[^]]*\]\([^)]*\)\n?", re.MULTILINE)
 
@@ -36,4 +38,9 @@ def _text(text: str) -> list[dict[str, object]]:
 
 
 def _cell(kind: str, source: str, **more: object) -> dict[str, object]:
-    return {"cell_type": kind, "metadata": {}, "source": source.rstrip("\n").splitlines(keepends=True), **more}
+    return {
+        "cell_type": kind,
+        "metadata": {},
+        "source": source.rstrip("\n").splitlines(keepends=True),
+        **more,
+    }

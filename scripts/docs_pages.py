@@ -1,4 +1,4 @@
-"""Pages of the documentation that are made when it is built: gallery, pictures, notebooks, pages from the root.
+"""Pages that are made when the documentation is built: gallery, pictures, notebooks, pages of the root.
 
 A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; if one fails, or
 prints something else than the page says, the build fails. What a script or a page produced is kept in
@@ -34,26 +34,33 @@ CACHE = ROOT / "target" / "docs-cache"
 TEXT_ONLY = os.environ.get("FILIPPOV_DOCS") == "text"
 EXAMPLES = ROOT / "examples"
 RUN_FOLDERS = ("tutorial", "howto", "compare")
-RUN_PAGES = ("start.md",)
+RUN_PAGES = ("index.md", "start.md")
 # Pages of the repository that the documentation has too.
 FROM_ROOT = {f"{name.upper()}.md": f"{name}.md" for name in ("architecture", "changelog", "contributing")}
 FROM_ROOT |= {"benchmarks/README.md": "benchmarks.md"}
 # The gallery by fields; an example that is not named here comes last.
 FIELDS = {
-    "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks two_masses
-        stick_slip_cycle bouncing_ball structural_pounding""",
-    "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order thermostat""",
+    "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks
+        two_masses stick_slip_cycle bouncing_ball structural_pounding""",
+    "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order
+        thermostat""",
     "Power electronics": "buck_converter rectifier",
     "Biology, climate": "gene_network neuron ocean",
     "Surfaces and where they meet": "plane_and_quadric hidden_dynamics curved_surface",
-    "Cycles and branches": """friction_branch belt_branch drill_string_branch impact_oscillator converter_doubling
-        harvested_predators""",
+    "Cycles and branches": """friction_branch belt_branch drill_string_branch impact_oscillator
+        converter_doubling harvested_predators""",
     "Derivatives, identification, optimisation": """ball_of_states stribeck_identification converter_switching
         relay_tuning""",
 }
-_FIGURE = re.compile(r"^!\[(?P<caption>[^]]*)\]\((?P<source>figures/\w+)\.svg\)$", re.MULTILINE)
+_FIGURE = re.compile(r"^!\[(?P<caption>[^]]*)\]\((?P<source>(?:theory/)?figures/\w+)\.svg\)$", re.MULTILINE)
 # Colours of a figure on a light page, and on a dark one.
-DARK = {"#000000": "#e8edf2", "#ffffff": "#1e2129", "#555555": "#b4bcc4", "#bbbbbb": "#56606a", "#0072b2": "#56b4e9"}
+DARK = {
+    "#000000": "#e8edf2",
+    "#ffffff": "#1e2129",
+    "#555555": "#b4bcc4",
+    "#bbbbbb": "#56606a",
+    "#0072b2": "#56b4e9",
+}
 _BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -68,7 +75,7 @@ def on_files(files: Any, config: Any) -> Any:
     jobs = [*sorted(EXAMPLES.glob("*/*.py")), *_pages_to_run(docs)]
     with ThreadPoolExecutor(max_workers=2) as pool:
         made = list(pool.map(lambda job: _produced(job, docs), jobs))
-    for job, produced in zip(jobs, made, strict=True):
+    for produced in made:
         for name, content in produced.items():
             files.append(File.generated(config, name, content=content))
     scripts = {job.stem: job for job in jobs if job.suffix == ".py"}
@@ -147,7 +154,9 @@ def _state_of_the_package() -> str:
     """Return a digest of all that an example or a page may use: sources of the package, and the core."""
     found = hashlib.sha256()
     package = ROOT / "python" / "filippov"
-    for path in sorted([*package.rglob("*.py"), *package.glob("_core*"), ROOT / "scripts" / "readme_blocks.py"]):
+    for path in sorted(
+        [*package.rglob("*.py"), *package.glob("_core*"), ROOT / "scripts" / "readme_blocks.py"]
+    ):
         found.update(path.read_bytes())
     return found.hexdigest()
 
@@ -234,8 +243,8 @@ def _add_gallery(files: Any, config: Any, scripts: dict[str, Path]) -> None:
     fields["More"] = [name for name in scripts if name not in named]
     lines = [
         "# Gallery",
-        "Each page has the problem in words, the picture, the numbers beside their references, and the script to "
-        "download. If a number is off, the example fails, and with it the tests.",
+        "Each page has the problem in words, the picture, the numbers beside their references, and the "
+        "script to download. If a number is off, the example fails, and with it the tests.",
     ]
     entries: list[Any] = ["gallery/index.md"]
     for field, names in fields.items():
@@ -270,11 +279,15 @@ def _figure(match: re.Match[str]) -> str:
         f"![{alternative}]({match['source']}{suffix}.svg#only-{ground})"
         for suffix, ground in (("", "light"), (".dark", "dark"))
     )
-    return f'<figure class="drawn" markdown="span">\n{pictures}\n<figcaption>{match["caption"]}</figcaption>\n</figure>'
+    caption = f"<figcaption>{match['caption']}</figcaption>"
+    return f'<figure class="drawn" markdown="span">\n{pictures}\n{caption}\n</figure>'
 
 
 def _dark(svg: str) -> str:
-    return re.sub("|".join(DARK), lambda match: DARK[match[0]], svg)
+    """Return a figure in the colours of a dark page; Matplotlib leaves out the fill of black letters."""
+    recoloured = re.sub("|".join(DARK), lambda match: DARK[match[0]], svg)
+    letters = f'<style type="text/css">g[id^="text_"] {{fill: {DARK["#000000"]}}}</style>'
+    return recoloured.replace("<defs>", f"<defs>{letters}", 1)
 
 
 def _decisions(docs: Path) -> list[Any]:

@@ -1,7 +1,7 @@
 """Draw the figures of the theory pages: ``python scripts/theory_figures.py [NAME ...]``.
 
-Each function here that is listed in `FIGURES` draws one file of `docs/theory/figures/`. The pages in dark colours
-replace the colours below (`DARK` in `docs_pages.py`).
+Each function here that is listed in `FIGURES` draws one file of `docs/theory/figures/`. Dark pages replace
+the colours below (`DARK` in `docs_pages.py`).
 """
 
 from __future__ import annotations
@@ -125,9 +125,9 @@ def two_folds() -> Figure:
     x, y = np.meshgrid(np.linspace(-1, 1, 80), np.linspace(-1, 1, 80))
     cases = (
         ("a visible tangency", lambda x: 1.2 * x, lambda x: 0 * x + 0.6),
-        ("two-fold, visible–visible", lambda x: 1.2 * x, lambda x: -1.2 * x),
-        ("visible–invisible", lambda x: 1.2 * x, lambda x: 1.2 * x),
-        ("invisible–invisible", lambda x: -1.2 * x, lambda x: 1.2 * x),
+        ("two-fold, visible-visible", lambda x: 1.2 * x, lambda x: -1.2 * x),
+        ("visible-invisible", lambda x: 1.2 * x, lambda x: 1.2 * x),
+        ("invisible-invisible", lambda x: -1.2 * x, lambda x: 1.2 * x),
     )
     for ax, (title, above, below) in zip(axes, cases, strict=True):
         plain(ax, title)
@@ -155,7 +155,9 @@ def bernstein() -> Figure:
         weights = [(1 - theta) ** 3, 3 * theta * (1 - theta) ** 2, 3 * theta**2 * (1 - theta), theta**3]
         ax.fill(nodes, polygon, color=PALE, alpha=0.35, lw=0)
         ax.plot(nodes, polygon, "o--", color=GREY, lw=1, ms=4, label="Bernstein coefficients")
-        ax.plot(theta, sum(w * b for w, b in zip(weights, polygon, strict=True)), color=BLUE, label="the guard")
+        ax.plot(
+            theta, sum(w * b for w, b in zip(weights, polygon, strict=True)), color=BLUE, label="the guard"
+        )
         ax.plot([0, 1], [g0, g1], "s", color=INK, ms=4)
         ax.axhline(0, color=INK, lw=0.8)
         ax.set(xlabel=r"$\theta$", xticks=[0, 0.5, 1])
@@ -183,7 +185,12 @@ def steps() -> Figure:
         ax.plot(fine, sol.sol(fine)[1] - 3.2 * offset, color=color, lw=1.2)
         ax.plot(sol.t, sol.y[1] - 3.2 * offset, "o", color=color, ms=3.5)
         ax.text(30.4, -3.2 * offset, f"{method}\n{sol.stats['n_steps']} steps", color=color, va="center")
-    ax.set(xlabel="$t$", yticks=[], xlim=(0, 34), title="velocity of the oscillator with dry friction, rtol = atol = 1e-9")
+    ax.set(
+        xlabel="$t$",
+        yticks=[],
+        xlim=(0, 34),
+        title="velocity of the oscillator with dry friction, rtol = atol = 1e-9",
+    )
     ax.title.set_fontsize(10)
     ax.spines["left"].set_visible(False)
     return figure
@@ -193,27 +200,34 @@ def square() -> Figure:
     """Draw the hidden dynamics of an intersection: sliding on both surfaces, and a passage."""
     figure, axes = panels(2, 3.4)
     cases = (
-        ("the root attracts: sliding on both surfaces", {(-1, -1): (1, 1.2), (-1, 1): (1, -1), (1, -1): (-1, 1), (1, 1): (-1.4, -1)}),
-        ("no root: the trajectory leaves into the region (+, +)", {(-1, -1): (1, 1), (-1, 1): (1.2, 0.3), (1, -1): (0.4, 1), (1, 1): (1, 1)}),
+        (
+            "the root attracts: sliding on both surfaces",
+            {(-1, -1): (1, 1.2), (-1, 1): (1, -1), (1, -1): (-1, 1), (1, 1): (-1.4, -1)},
+        ),
+        (
+            "no root: the trajectory leaves into the region (+, +)",
+            {(-1, -1): (1, 1), (-1, 1): (1.2, 0.3), (1, -1): (0.4, 1), (1, 1): (1, 1)},
+        ),
     )
     for ax, (title, fields) in zip(axes, cases, strict=True):
         grid = np.linspace(-1, 1, 60)
         a, b = np.meshgrid(grid, grid)
-        g = [
-            sum((1 + k[0] * a) / 2 * (1 + k[1] * b) / 2 * f[j] for k, f in fields.items()) for j in (0, 1)
-        ]
+        g = [sum((1 + k[0] * a) / 2 * (1 + k[1] * b) / 2 * f[j] for k, f in fields.items()) for j in (0, 1)]
         ax.streamplot(a, b, *g, color=GREY, density=0.7, linewidth=0.8, arrowsize=0.9)
         for j, color in ((0, BLUE), (1, ORANGE)):
             if g[j].min() < 0 < g[j].max():
                 ax.contour(a, b, g[j], [0], colors=color, linewidths=1.6)
         ax.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], color=INK, lw=1)
-        ax.set(aspect="equal", xlabel=r"$\lambda_1$", ylabel=r"$\lambda_2$", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+        ax.set(
+            aspect="equal", xlabel=r"$\lambda_1$", ylabel=r"$\lambda_2$", xticks=[-1, 0, 1], yticks=[-1, 0, 1]
+        )
         ax.set_title(title, fontsize=10, pad=18)
         ax.spines[:].set_visible(False)
     x, y = 0.0, 0.0
     for _ in range(4000):
         g = [
-            sum((1 + k[0] * x) / 2 * (1 + k[1] * y) / 2 * f[j] for k, f in cases[0][1].items()) for j in (0, 1)
+            sum((1 + k[0] * x) / 2 * (1 + k[1] * y) / 2 * f[j] for k, f in cases[0][1].items())
+            for j in (0, 1)
         ]
         x, y = x + 0.01 * g[0], y + 0.01 * g[1]
     axes[0].plot(x, y, "o", color=GREEN, ms=8)
@@ -228,7 +242,12 @@ def rules() -> Figure:
     signs = [(-1, -1), (-1, 1), (1, -1), (1, 1)]
     drift = {(-1, -1): 0.0, (-1, 1): 1.0, (1, -1): 1.0, (1, 1): 0.0}
     values = np.linspace(0.4, 2.5, 22)
-    lines = (("canopy", BLUE, "-"), ("moments", ORANGE, "--"), ("minimum-norm", GREEN, "-."), ("dieci-lopez", INK, ":"))
+    lines = (
+        ("canopy", BLUE, "-"),
+        ("moments", ORANGE, "--"),
+        ("minimum-norm", GREEN, "-."),
+        ("dieci-lopez", INK, ":"),
+    )
     for rule, color, style in lines:
         speeds = []
         for value in values:
@@ -310,7 +329,15 @@ def laws() -> Figure:
         if k > -2:
             right.plot([k, k], [k - 1, k], color=GREEN, lw=3, solid_capstyle="butt")
     right.set(xlabel="$g$", ylabel=r"$\lfloor g\rfloor$")
-    right.text(0.98, 0.08, "on a level the motion may slide:\nany value in between", color=GREEN, ha="right", fontsize=9, transform=right.transAxes)
+    right.text(
+        0.98,
+        0.08,
+        "on a level the motion may slide:\nany value in between",
+        color=GREEN,
+        ha="right",
+        fontsize=9,
+        transform=right.transAxes,
+    )
     right.set_title("a quantiser: each level is a surface", fontsize=10)
     return figure
 
@@ -321,8 +348,20 @@ def static_friction() -> Figure:
     v = np.linspace(0.002, 1, 200)
     for sign in (-1, 1):
         left.plot(sign * v, sign * np.ones_like(v), color=BLUE, label="Coulomb" if sign > 0 else None)
-        left.plot(sign * v, sign * (0.6 + 0.8 * np.exp(-5 * v)), color=ORANGE, label="Stribeck" if sign > 0 else None)
-    left.plot([0, 0], [-1.4, 1.4], color=GREEN, lw=4, solid_capstyle="butt", label="sticking, up to the static limit")
+        left.plot(
+            sign * v,
+            sign * (0.6 + 0.8 * np.exp(-5 * v)),
+            color=ORANGE,
+            label="Stribeck" if sign > 0 else None,
+        )
+    left.plot(
+        [0, 0],
+        [-1.4, 1.4],
+        color=GREEN,
+        lw=4,
+        solid_capstyle="butt",
+        label="sticking, up to the static limit",
+    )
     left.axhline(0, color=PALE, lw=0.8)
     left.set(xlabel="$v$", ylabel="friction", ylim=(-1.6, 3.3))
     left.legend(loc="upper left", fontsize=8)
@@ -363,7 +402,13 @@ def instant() -> Figure:
     plain(ax, "")
     boxes(
         ax,
-        ["events of the user\nrecorded, with the\nstate before", "resets, ticks, times\nin the order given", "laws with\na memory", "resets that the jump\ntriggers, until\nthere are none", "the mode\nis decided"],
+        [
+            "events of the user\nrecorded, with the\nstate before",
+            "resets, ticks, times\nin the order given",
+            "laws with\na memory",
+            "resets that the jump\ntriggers, until\nthere are none",
+            "the mode\nis decided",
+        ],
         colors=[ORANGE, BLUE, BLUE, BLUE, GREEN],
     )  # fmt: skip
     ax.set(xlim=(-0.5, 4.4), ylim=(-0.8, 0.6))
@@ -377,7 +422,13 @@ def tracing() -> Figure:
     plain(ax, "")
     boxes(
         ax,
-        ["Python function\nv, -x - np.sign(v - 1)", "called with\nsymbols", "expression graph,\neach node once", "surface  $h=v-1$\nfield  $f=(v,\\,-x-s)$\nsign  $s=\\pm1$ as data", "derivatives, series,\nbounds,\nnative code"],
+        [
+            "Python function\nv, -x - np.sign(v - 1)",
+            "called with\nsymbols",
+            "expression graph,\neach node once",
+            "surface  $h=v-1$\nfield  $f=(v,\\,-x-s)$\nsign  $s=\\pm1$ as data",
+            "derivatives, series,\nbounds,\nnative code",
+        ],
         colors=[ORANGE, BLUE, BLUE, GREEN, BLUE],
     )  # fmt: skip
     ax.set(xlim=(-0.6, 4.5), ylim=(-0.6, 0.6))
@@ -390,7 +441,10 @@ def saltation() -> Figure:
     angle = np.linspace(0, 2 * np.pi, 41)
     cases = (
         ("crossing: a matrix of full rank", lambda t, x: [1.0, np.where(x[1] > 0, -1.0, -0.35)]),
-        ("entry to sliding: one rank is lost", lambda t, x: [np.where(x[1] > 0, 1.0, 0.8), np.where(x[1] > 0, -1.0, 1.0)]),
+        (
+            "entry to sliding: one rank is lost",
+            lambda t, x: [np.where(x[1] > 0, 1.0, 0.8), np.where(x[1] > 0, -1.0, 1.0)],
+        ),
     )
     for ax, (title, fun) in zip(axes, cases, strict=True):
         ax.axhline(0, color=INK, lw=1)
@@ -413,7 +467,9 @@ def sliding_bifurcations() -> Figure:
     """Sketch the four bifurcations of a cycle with a region of sliding."""
     figure, axes = panels(4, 2.3, 9.5)
     curve = np.linspace(0, 1, 60)
-    for ax, title in zip(axes, ("crossing-sliding", "grazing-sliding", "switching-sliding", "adding-sliding"), strict=True):
+    for ax, title in zip(
+        axes, ("crossing-sliding", "grazing-sliding", "switching-sliding", "adding-sliding"), strict=True
+    ):
         plain(ax, title)
         ax.axhline(0, color=GREY, lw=0.9)
         ax.plot([-0.6, 0.6], [0, 0], color=PALE, lw=7, solid_capstyle="butt", zorder=0)
@@ -481,7 +537,14 @@ def home() -> Figure:
     sticks = [segment for segment in sol.segments if segment.mode.is_sliding]
     for number, segment in enumerate(sticks):
         ends = [segment.t_start, segment.t_end]
-        left.plot(ends, [0, 0], color=ORANGE, lw=5, solid_capstyle="butt", label=None if number else "it sticks: velocity 0")
+        left.plot(
+            ends,
+            [0, 0],
+            color=ORANGE,
+            lw=5,
+            solid_capstyle="butt",
+            label=None if number else "it sticks: velocity 0",
+        )
     for switch in sol.switches:
         left.plot(switch.t, 0, "o", color=INK, ms=3)
     left.set(xlabel="time", ylim=(-2.2, 3.1))
@@ -501,8 +564,8 @@ def home() -> Figure:
 
 
 FIGURES = (
-    fates, convex, two_folds, bernstein, steps, square, rules, twisting, bounce, laws, static_friction, instant, tracing,
-    saltation, sliding_bifurcations, home,
+    fates, convex, two_folds, bernstein, steps, square, rules, twisting, bounce, laws, static_friction, instant,
+    tracing, saltation, sliding_bifurcations, home,
 )  # fmt: skip
 
 
