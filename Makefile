@@ -4,7 +4,7 @@ SHELL := /bin/sh
 PYTHON ?= python3
 CARGO ?= cargo
 VENV ?= .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PY := $(BIN)/python
 
 # Stamp files: an up-to-date environment and extension are not built again.
@@ -31,8 +31,11 @@ export MPLBACKEND ?= Agg
 N ?= 6000
 SEED ?= 0
 
-.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz decisions bench demo \
-	pictures docs check all clean
+# Options of maturin for `make build-release`, such as the target and the compatibility of the wheel.
+WHEEL ?=
+
+.PHONY: help tools setup build build-release sdist check-wheel check-sdist check-crates fmt lint types test test-rs test-py \
+	test-fast test-slow fuzz decisions bench demo pictures figures docs docs-text check all clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,8 +47,20 @@ setup: $(ENV_STAMP) ## create the environment in .venv
 
 build: $(BUILD_STAMP) ## compile the extension, optimised, into the environment
 
-build-release: $(ENV_STAMP) ## build a wheel into dist/
-	$(MATURIN) build --release --out dist
+build-release: $(ENV_STAMP) ## build a wheel into dist/; WHEEL has options of maturin
+	$(MATURIN) build --release --locked --out dist $(WHEEL)
+
+sdist: $(ENV_STAMP) ## pack the sources into dist/
+	$(MATURIN) sdist --out dist
+
+check-wheel: ## install the wheel of dist/ into a fresh environment without Rust, and run the README there
+	sh scripts/check_package.sh "$(PYTHON)" dist/filippov-*.whl
+
+check-sdist: ## build the sources of dist/ in a fresh environment, and run the README there
+	sh scripts/check_package.sh "$(PYTHON)" dist/filippov-*.tar.gz
+
+check-crates: tools ## pack the Rust crates as for crates.io, and build what was packed
+	$(CARGO) publish --dry-run --locked -p filippov-expr -p filippov
 
 fmt: $(ENV_STAMP) ## format the Rust and the Python sources
 	$(CARGO) fmt --all
@@ -107,6 +122,12 @@ demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 
 pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
+
+figures: $(BUILD_STAMP) ## draw the figures of the theory pages and of the first page again
+	$(PY) scripts/theory_figures.py
+
+docs-text: $(DOCS_STAMP) ## the documentation without running its code: for work on the text
+	FILIPPOV_DOCS=text NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet

@@ -564,8 +564,8 @@ def home() -> Figure:
 
 
 FIGURES = (
-    fates, convex, two_folds, bernstein, steps, square, rules, twisting, bounce, laws, static_friction, instant,
-    tracing, saltation, sliding_bifurcations, home,
+    fates, convex, two_folds, bernstein, steps, square, rules, twisting, bounce, laws, static_friction,
+    instant, tracing, saltation, sliding_bifurcations, home,
 )  # fmt: skip
 
 
