@@ -34,9 +34,9 @@ def test_the_notes_of_a_release_are_the_section_of_its_version() -> None:
         notes("9.9.9")
     with pytest.raises(SystemExit, match=r"do not name version 9\.9\.9"):
         main("9.9.9")
-    text = (
-        notes("Unreleased") if "\n## [0.2.0]" not in (ROOT / "CHANGELOG.md").read_text() else notes("0.2.0")
-    )
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.findall(r"^## \[(\d.*?)\]", changelog, re.MULTILINE)
+    text = notes(released[0] if released else "Unreleased")
     assert "### Added" in text
     assert "\n## " not in text
 

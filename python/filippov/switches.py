@@ -519,7 +519,7 @@ def import_pandas() -> Any:
     try:
         return import_module("pandas")
     except ImportError as error:
-        raise ImportError("to_pandas() needs pandas: pip install filippov[pandas]") from error
+        raise ImportError("to_pandas() needs pandas: pip install pandas") from error
 
 
 def import_xarray() -> Any:

@@ -3,7 +3,7 @@
 Every function takes ``ax=`` and returns it, draws on a light or a dark ground (``dark=``, or `style` around
 many figures), and tells things apart by width, style or marker besides colour.
 
-Needs Matplotlib: ``pip install filippov[plot]``.
+Needs Matplotlib: ``pip install matplotlib``.
 """
 
 from __future__ import annotations
