@@ -52,6 +52,10 @@ FIELDS = {
     "Derivatives, identification, optimisation": """ball_of_states stribeck_identification converter_switching
         relay_tuning""",
 }
+# A link that is left out where its page is not part of the site.
+_IF_BUILT = re.compile(
+    r'^<a class="[^"]*\bif-built\b[^"]*" href="(?P<page>[^"]+)\.html">.*</a>\n', re.MULTILINE
+)
 _FIGURE = re.compile(r"^!\[(?P<caption>[^]]*)\]\((?P<source>(?:theory/)?figures/\w+)\.svg\)$", re.MULTILINE)
 # Colours of a figure on a light page, and on a dark one.
 DARK = {
@@ -91,9 +95,12 @@ def on_files(files: Any, config: Any) -> Any:
     return files
 
 
-def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+def on_page_markdown(markdown: str, page: Any, files: Any, **_: Any) -> str:
     """Let links written for the repository lead to the pages made of what they name."""
     here = page.file.src_uri
+    markdown = _IF_BUILT.sub(
+        lambda match: match[0] if files.get_file_from_path(f"{match['page']}.md") else "", markdown
+    )
     if here.startswith("tutorial/"):
         link = f"[Download this page as a notebook]({_notebook_name(Path(here).stem)}){{ .md-button }}"
         markdown = f"{markdown.rstrip()}\n\n{link}\n"
