@@ -126,10 +126,10 @@ pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 figures: $(BUILD_STAMP) ## draw the figures of the theory pages and of the first page again
 	$(PY) scripts/theory_figures.py
 
-docs-text: $(DOCS_STAMP) ## the documentation without running its code: for work on the text
+docs-text: $(DOCS_STAMP) ## the documentation without running its code or compiling anything: for work on the text
 	FILIPPOV_DOCS=text NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
-docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
+docs: $(BUILD_STAMP) $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
 
@@ -152,8 +152,8 @@ $(BENCH_STAMP): $(BUILD_STAMP)
 	$(MATURIN) develop --release --extras bench
 	@touch $@
 
-$(DOCS_STAMP): $(BUILD_STAMP)
-	$(MATURIN) develop --release --extras docs
+$(DOCS_STAMP): $(ENV_STAMP)
+	$(PY) -m pip install --quiet --group docs
 	@touch $@
 
 $(BUILD_STAMP): $(ENV_STAMP) $(RUST_SOURCES)
