@@ -144,9 +144,9 @@ def solve_ivp(
         Print how far the run is, or call a function of the time reached. What that raises ends the run, and
         is raised again with the solution up to there as `partial`.
     wrt : str or sequence of str, optional
-        The quantities by which the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` for all
-        of these, ``"all"`` for the states and them. `Solution.derivative` and ``sol.switches.dt`` are the
-        derivatives. Default: none are followed.
+        The quantities by which the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters,
+        ``"params"`` for all of these, ``"all"`` for the states and them. `Solution.derivative` and
+        ``sol.switches.dt`` are the derivatives. Default: none are followed.
     order : {1, 2}, optional
         Up to which order derivatives are followed.
 
