@@ -195,7 +195,7 @@ class Solution:
         Numbers of evaluations of the field, those for Jacobians by differences included, of Jacobians, and
         of factorisations; the last two are 0 unless ``method="Rodas5P"`` took steps.
     status : int
-        0: the end was reached; 1: a terminal event; negative: the run failed, and this is the part up to there.
+        0: the end was reached; 1: a terminal event; negative: the run failed, this is the part up to there.
     message : str
         The reason, in words.
     success : bool
