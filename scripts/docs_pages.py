@@ -17,7 +17,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -65,6 +64,7 @@ DARK = {
     "#bbbbbb": "#56606a",
     "#0072b2": "#56b4e9",
 }
+_PICTURE = re.compile(r"(!\[[^]]*\]\()([^)/]*\.png)(?=\))")
 _BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -104,6 +104,8 @@ def on_page_markdown(markdown: str, page: Any, files: Any, **_: Any) -> str:
     if here.startswith("tutorial/"):
         link = f"[Download this page as a notebook]({_notebook_name(Path(here).stem)}){{ .md-button }}"
         markdown = f"{markdown.rstrip()}\n\n{link}\n"
+    if here in RUN_PAGES or here.startswith(tuple(f"{folder}/" for folder in RUN_FOLDERS)):
+        markdown = _PICTURE.sub(lambda match: match[1] + _picture_name(Path(here).stem, match[2]), markdown)
     markdown = _FIGURE.sub(_figure, markdown)
     original = {target: ROOT / name for name, target in FROM_ROOT.items()}.get(here, ROOT / "docs" / here)
 
@@ -169,48 +171,39 @@ def _state_of_the_package() -> str:
 
 
 def _produced(job: Path, docs: Path) -> dict[str, str | bytes]:
-    """Return the files that an example or a page with code makes, from the cache if nothing has changed."""
+    """Return the pages and pictures of the site that an example or a page with code makes."""
+    made = _made(job)
+    if job.suffix == ".py":
+        page = _example_page(job, made.pop("printed.txt", b"(not run)").decode())
+        return {
+            f"gallery/{job.stem}.md": page,
+            f"gallery/{job.stem}.png": made.get(f"{job.stem}.png", _BLANK),
+        }
+    shown = _PICTURE.findall(job.read_text(encoding="utf-8"))
+    beside = job.parent.relative_to(docs)
+    return {(beside / _picture_name(job.stem, name)).as_posix(): made.get(name, _BLANK) for _, name in shown}
+
+
+def _made(job: Path) -> dict[str, bytes]:
+    """Return what an example or a page prints and draws, from the cache if nothing has changed."""
     kept = CACHE / job.relative_to(ROOT).as_posix().replace("/", "-")
     key = hashlib.sha256(job.read_bytes() + _state_of_the_package().encode()).hexdigest()
     mark = kept / "key"
-    if not (mark.is_file() and (TEXT_ONLY or mark.read_text() == key)):
-        if TEXT_ONLY:
-            return _blank(job, docs)
-        made = _example(job) if job.suffix == ".py" else _page(job, docs)
+    if not (TEXT_ONLY or (mark.is_file() and mark.read_text() == key)):
         shutil.rmtree(kept, ignore_errors=True)
-        for name, content in made.items():
-            path = kept / "files" / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content.encode() if isinstance(content, str) else content)
-        kept.mkdir(parents=True, exist_ok=True)
+        (kept / "made").mkdir(parents=True)
+        if job.suffix == ".py":
+            printed = _run([str(job), str(kept / "made" / f"{job.stem}.png")], job)
+            (kept / "made" / "printed.txt").write_text(printed, encoding="utf-8")
+        else:
+            _run([str(ROOT / "scripts" / "readme_blocks.py"), str(job), str(kept / "made")], job)
         mark.write_text(key)
-    files = kept / "files"
-    return {path.relative_to(files).as_posix(): path.read_bytes() for path in files.rglob("*.*")}
+    return {path.name: path.read_bytes() for path in sorted((kept / "made").glob("*.*"))}
 
 
-def _blank(job: Path, docs: Path) -> dict[str, str | bytes]:
-    """Return what stands for the files of a job that was never run."""
-    if job.suffix == ".py":
-        return {f"gallery/{job.stem}.md": _example_page(job, "(not run)"), f"gallery/{job.stem}.png": _BLANK}
-    shown = re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", job.read_text(encoding="utf-8"))
-    return {(job.parent.relative_to(docs) / name).as_posix(): _BLANK for name in shown}
-
-
-def _page(page: Path, docs: Path) -> dict[str, str | bytes]:
-    """Run the code of a page; return the pictures that it draws, to stand beside it."""
-    with tempfile.TemporaryDirectory() as folder:
-        _run([str(ROOT / "scripts" / "readme_blocks.py"), str(page), folder], page)
-        beside = page.parent.relative_to(docs).as_posix()
-        return {f"{beside}/{path.name}": path.read_bytes() for path in sorted(Path(folder).glob("*.png"))}
-
-
-def _example(script: Path) -> dict[str, str | bytes]:
-    """Run an example; return its page and its picture."""
-    with tempfile.TemporaryDirectory() as folder:
-        picture = Path(folder) / f"{script.stem}.png"
-        printed = _run([str(script), str(picture)], script)
-        found = picture.read_bytes()
-    return {f"gallery/{script.stem}.md": _example_page(script, printed), f"gallery/{script.stem}.png": found}
+def _picture_name(stem: str, name: str) -> str:
+    """Return the name of a picture on the site: two pages of a folder may draw pictures of the same name."""
+    return f"{stem}.{name}"
 
 
 def _words(script: Path) -> list[str]:
