@@ -4,7 +4,7 @@ SHELL := /bin/sh
 PYTHON ?= python3
 CARGO ?= cargo
 VENV ?= .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PY := $(BIN)/python
 
 # Stamp files: an up-to-date environment and extension are not built again.
@@ -31,8 +31,11 @@ export MPLBACKEND ?= Agg
 N ?= 6000
 SEED ?= 0
 
-.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz decisions bench demo \
-	pictures app docs check all clean
+# Options of maturin for `make build-release`, such as the target and the compatibility of the wheel.
+WHEEL ?=
+
+.PHONY: help tools setup build build-release sdist check-wheel check-sdist check-crates fmt lint types test test-rs test-py \
+	test-fast test-slow fuzz decisions bench demo pictures figures app docs docs-text check all clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,8 +47,20 @@ setup: $(ENV_STAMP) ## create the environment in .venv
 
 build: $(BUILD_STAMP) ## compile the extension, optimised, into the environment
 
-build-release: $(ENV_STAMP) ## build a wheel into dist/
-	$(MATURIN) build --release --out dist
+build-release: $(ENV_STAMP) ## build a wheel into dist/; WHEEL has options of maturin
+	$(MATURIN) build --release --locked --out dist $(WHEEL)
+
+sdist: $(ENV_STAMP) ## pack the sources into dist/
+	$(MATURIN) sdist --out dist
+
+check-wheel: ## install the wheel of dist/ into a fresh environment without Rust, and run the README there
+	sh scripts/check_package.sh "$(PYTHON)" dist/filippov-*.whl
+
+check-sdist: ## build the sources of dist/ in a fresh environment, and run the README there
+	sh scripts/check_package.sh "$(PYTHON)" dist/filippov-*.tar.gz
+
+check-crates: tools ## pack the Rust crates as for crates.io, and build what was packed
+	$(CARGO) publish --dry-run --locked -p filippov-expr -p filippov
 
 fmt: $(ENV_STAMP) ## format the Rust and the Python sources
 	$(CARGO) fmt --all
@@ -111,7 +126,13 @@ pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 app: ## the interactive page, into python/filippov/app/static; skips by name what cannot be built here
 	@CARGO="$(CARGO)" sh scripts/build_app.sh
 
-docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
+figures: $(BUILD_STAMP) ## draw the figures of the theory pages and of the first page again
+	$(PY) scripts/theory_figures.py
+
+docs-text: $(DOCS_STAMP) ## the documentation without running its code or compiling anything: for work on the text
+	FILIPPOV_DOCS=text NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
+docs: $(BUILD_STAMP) $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
 
@@ -134,8 +155,8 @@ $(BENCH_STAMP): $(BUILD_STAMP)
 	$(MATURIN) develop --release --extras bench
 	@touch $@
 
-$(DOCS_STAMP): $(BUILD_STAMP)
-	$(MATURIN) develop --release --extras docs
+$(DOCS_STAMP): $(ENV_STAMP)
+	$(PY) -m pip install --quiet --group docs
 	@touch $@
 
 $(BUILD_STAMP): $(ENV_STAMP) $(RUST_SOURCES)

@@ -135,7 +135,7 @@ def main() -> None:
     available = {name: find_spec(name) is not None for name in ("numba", "scipy", "heyoka")}
     for name, found in available.items():
         if not found:
-            print(f"{name} is missing, its comparison is left out: pip install filippov[bench]")
+            print(f"{name} is missing, its comparison is left out: `make bench` installs it")
     text: list[str] = []
     if compiler() is None:
         print("gcc or cc is missing, the comparison with the C loop is left out")

@@ -77,7 +77,7 @@ def main() -> None:
         )
     ]
     if find_spec("scipy") is None:
-        print("scipy is missing, the errors are left out: pip install filippov[bench]")
+        print("scipy is missing, the errors are left out: `make bench` installs it")
     else:
         expected = np.array(by_radau())
         lines += [

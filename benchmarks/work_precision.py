@@ -305,7 +305,7 @@ def main() -> None:
     arguments = parser.parse_args()
     for name in PEERS:
         if find_spec(name) is None:
-            print(f"{name} is missing, its loops are left out: pip install filippov[bench]")
+            print(f"{name} is missing, its loops are left out: `make bench` installs it")
     results, text, lines = {}, [], []
     for case in cases():
         results[case.title] = measured(case, arguments.repeats)

@@ -1,17 +1,22 @@
-"""Pages of the documentation that are made when it is built: gallery, pictures, pages from the root.
+"""Pages that are made when the documentation is built: gallery, pictures, notebooks, pages of the root.
 
-A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; where one fails,
-or prints something else than the page says, the build fails.
+A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; if one fails, or
+prints something else than the page says, the build fails. What a script or a page produced is kept in
+`target/docs-cache` until it or the package changes. With `FILIPPOV_DOCS=text` in the environment
+(`make docs-text`) nothing is run: pictures are those that were kept, or blank.
 """
 
 from __future__ import annotations
 
 import ast
+import base64
+import functools
+import hashlib
 import os
 import re
+import shutil
 import subprocess
 import sys
-import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,10 +25,49 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from docs_notebooks import notebook  # noqa: E402
+
+CACHE = ROOT / "target" / "docs-cache"
+TEXT_ONLY = os.environ.get("FILIPPOV_DOCS") == "text"
 EXAMPLES = ROOT / "examples"
 RUN_FOLDERS = ("tutorial", "howto", "compare")
-# Pages of the root of the repository that the documentation has too.
+RUN_PAGES = ("index.md", "start.md")
+# Pages of the repository that the documentation has too.
 FROM_ROOT = {f"{name.upper()}.md": f"{name}.md" for name in ("architecture", "changelog", "contributing")}
+FROM_ROOT |= {"benchmarks/README.md": "benchmarks.md"}
+# The gallery by fields; an example that is not named here comes last.
+FIELDS = {
+    "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks
+        two_masses stick_slip_cycle bouncing_ball structural_pounding""",
+    "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order
+        thermostat""",
+    "Power electronics": "buck_converter rectifier",
+    "Biology, climate": "gene_network neuron ocean",
+    "Surfaces and where they meet": "plane_and_quadric hidden_dynamics curved_surface",
+    "Cycles and branches": """friction_branch belt_branch drill_string_branch impact_oscillator
+        converter_doubling harvested_predators""",
+    "Derivatives, identification, optimisation": """ball_of_states stribeck_identification converter_switching
+        relay_tuning""",
+}
+# A link that is left out where its page is not part of the site.
+_IF_BUILT = re.compile(
+    r'^<a class="[^"]*\bif-built\b[^"]*" href="(?P<page>[^"]+)\.html">.*</a>\n', re.MULTILINE
+)
+_FIGURE = re.compile(r"^!\[(?P<caption>[^]]*)\]\((?P<source>(?:theory/)?figures/\w+)\.svg\)$", re.MULTILINE)
+# Colours of a figure on a light page, and on a dark one.
+DARK = {
+    "#000000": "#e8edf2",
+    "#ffffff": "#1e2129",
+    "#555555": "#b4bcc4",
+    "#bbbbbb": "#56606a",
+    "#0072b2": "#56b4e9",
+}
+_PICTURE = re.compile(r"(!\[[^]]*\]\()([^)/]*\.png)(?=\))")
+_BLANK = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
 _LINK = re.compile(r"\[(?P<text>[^]\n]*)\]\((?P<target>(?!https?:|#)[^)\s]+)\)")
 
 
@@ -34,26 +78,37 @@ def on_files(files: Any, config: Any) -> Any:
         files.append(File.generated(config, target, content=(ROOT / name).read_text(encoding="utf-8")))
     jobs = [*sorted(EXAMPLES.glob("*/*.py")), *_pages_to_run(docs)]
     with ThreadPoolExecutor(max_workers=2) as pool:
-        made = list(pool.map(lambda job: _example(job) if job.suffix == ".py" else _page(job, docs), jobs))
-    for job, produced in zip(jobs, made, strict=True):
+        made = list(pool.map(lambda job: _produced(job, docs), jobs))
+    for produced in made:
         for name, content in produced.items():
             files.append(File.generated(config, name, content=content))
-        if job.suffix == ".py":
-            _gallery_entries(config).append({_title(job): f"gallery/{job.stem}.md"})
-    overview = "gallery/index.md"
-    scripts = [job for job in jobs if job.suffix == ".py"]
-    files.append(File.generated(config, overview, content=_overview(scripts)))
+    scripts = {job.stem: job for job in jobs if job.suffix == ".py"}
+    _add_gallery(files, config, scripts)
     for name, content in _app_pages().items():
         files.append(File.generated(config, name, content=content))
-    _gallery_entries(config).insert(0, overview)
+    for page in sorted((docs / "tutorial").glob("*.md")):
+        content = notebook(page.read_text(encoding="utf-8"))
+        files.append(File.generated(config, f"tutorial/{_notebook_name(page.stem)}", content=content))
+    for figure in sorted(docs.glob("*/figures/*.svg")):
+        name = figure.relative_to(docs).with_suffix(".dark.svg").as_posix()
+        files.append(File.generated(config, name, content=_dark(figure.read_text(encoding="utf-8"))))
     _replace(config.nav, "decisions", _decisions(docs))
     _complete(config.nav, docs)
     return files
 
 
-def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+def on_page_markdown(markdown: str, page: Any, files: Any, **_: Any) -> str:
     """Let links written for the repository lead to the pages made of what they name."""
     here = page.file.src_uri
+    markdown = _IF_BUILT.sub(
+        lambda match: match[0] if files.get_file_from_path(f"{match['page']}.md") else "", markdown
+    )
+    if here.startswith("tutorial/"):
+        link = f"[Download this page as a notebook]({_notebook_name(Path(here).stem)}){{ .md-button }}"
+        markdown = f"{markdown.rstrip()}\n\n{link}\n"
+    if here in RUN_PAGES or here.startswith(tuple(f"{folder}/" for folder in RUN_FOLDERS)):
+        markdown = _PICTURE.sub(lambda match: match[1] + _picture_name(Path(here).stem, match[2]), markdown)
+    markdown = _FIGURE.sub(_figure, markdown)
     original = {target: ROOT / name for name, target in FROM_ROOT.items()}.get(here, ROOT / "docs" / here)
 
     def renewed(match: re.Match[str]) -> str:
@@ -73,6 +128,8 @@ def _page_of(path: Path) -> str | None:
         return FROM_ROOT[path.name]
     if path == EXAMPLES / "README.md":
         return "gallery/index.md"
+    if path == ROOT / "benchmarks" or path == ROOT / "benchmarks" / "README.md":
+        return FROM_ROOT["benchmarks/README.md"]
     if path.is_relative_to(EXAMPLES) and path.suffix == ".py" and path.is_file():
         return f"gallery/{path.stem}.md"
     docs = ROOT / "docs"
@@ -85,7 +142,8 @@ def _page_of(path: Path) -> str | None:
 
 
 def _pages_to_run(docs: Path) -> list[Path]:
-    return [page for folder in RUN_FOLDERS for page in sorted((docs / folder).glob("*.md"))]
+    in_folders = [page for folder in RUN_FOLDERS for page in sorted((docs / folder).glob("*.md"))]
+    return [*(docs / name for name in RUN_PAGES), *in_folders]
 
 
 def _environment() -> dict[str, str]:
@@ -102,12 +160,16 @@ def _run(arguments: list[str], what: Path) -> str:
     return done.stdout
 
 
-def _page(page: Path, docs: Path) -> dict[str, bytes]:
-    """Run the code of a page; return the pictures that it draws, to stand beside it."""
-    with tempfile.TemporaryDirectory() as folder:
-        _run([str(ROOT / "scripts" / "readme_blocks.py"), str(page), folder], page)
-        beside = page.parent.relative_to(docs).as_posix()
-        return {f"{beside}/{path.name}": path.read_bytes() for path in sorted(Path(folder).glob("*.png"))}
+@functools.cache
+def _state_of_the_package() -> str:
+    """Return a digest of all that an example or a page may use: sources of the package, and the core."""
+    found = hashlib.sha256()
+    package = ROOT / "python" / "filippov"
+    for path in sorted(
+        [*package.rglob("*.py"), *package.glob("_core*"), ROOT / "scripts" / "readme_blocks.py"]
+    ):
+        found.update(path.read_bytes())
+    return found.hexdigest()
 
 
 def _app_pages() -> dict[str, bytes]:
@@ -120,13 +182,40 @@ def _app_pages() -> dict[str, bytes]:
         return {f"app/{path.relative_to(folder).as_posix()}": path.read_bytes() for path in made}
 
 
-def _example(script: Path) -> dict[str, str | bytes]:
-    """Run an example; return its page and its picture."""
-    with tempfile.TemporaryDirectory() as folder:
-        picture = Path(folder) / f"{script.stem}.png"
-        printed = _run([str(script), str(picture)], script)
-        found = picture.read_bytes()
-    return {f"gallery/{script.stem}.md": _example_page(script, printed), f"gallery/{script.stem}.png": found}
+def _produced(job: Path, docs: Path) -> dict[str, str | bytes]:
+    """Return the pages and pictures of the site that an example or a page with code makes."""
+    made = _made(job)
+    if job.suffix == ".py":
+        page = _example_page(job, made.pop("printed.txt", b"(not run)").decode())
+        return {
+            f"gallery/{job.stem}.md": page,
+            f"gallery/{job.stem}.png": made.get(f"{job.stem}.png", _BLANK),
+        }
+    shown = _PICTURE.findall(job.read_text(encoding="utf-8"))
+    beside = job.parent.relative_to(docs)
+    return {(beside / _picture_name(job.stem, name)).as_posix(): made.get(name, _BLANK) for _, name in shown}
+
+
+def _made(job: Path) -> dict[str, bytes]:
+    """Return what an example or a page prints and draws, from the cache if nothing has changed."""
+    kept = CACHE / job.relative_to(ROOT).as_posix().replace("/", "-")
+    key = hashlib.sha256(job.read_bytes() + _state_of_the_package().encode()).hexdigest()
+    mark = kept / "key"
+    if not (TEXT_ONLY or (mark.is_file() and mark.read_text() == key)):
+        shutil.rmtree(kept, ignore_errors=True)
+        (kept / "made").mkdir(parents=True)
+        if job.suffix == ".py":
+            printed = _run([str(job), str(kept / "made" / f"{job.stem}.png")], job)
+            (kept / "made" / "printed.txt").write_text(printed, encoding="utf-8")
+        else:
+            _run([str(ROOT / "scripts" / "readme_blocks.py"), str(job), str(kept / "made")], job)
+        mark.write_text(key)
+    return {path.name: path.read_bytes() for path in sorted((kept / "made").glob("*.*"))}
+
+
+def _picture_name(stem: str, name: str) -> str:
+    """Return the name of a picture on the site: two pages of a folder may draw pictures of the same name."""
+    return f"{stem}.{name}"
 
 
 def _words(script: Path) -> list[str]:
@@ -142,6 +231,7 @@ def _example_page(script: Path, printed: str) -> str:
     title, *rest = _words(script)
     code = script.read_text(encoding="utf-8").split('"""', 2)[2].strip()
     parts = [f"# {_title(script)}", title, *rest, f"![{_title(script)}]({script.stem}.png)"]
+    parts += [f"[Download the script]({script.name}){{ .md-button }}"]
     parts += ["## The numbers", f"```text\n{printed.rstrip()}\n```", "## The code", f"```python\n{code}\n```"]
     for module in _problem_modules(code):
         source = (ROOT / "python" / "filippov" / "problems" / f"{module}.py").read_text(encoding="utf-8")
@@ -158,29 +248,58 @@ def _problem_modules(code: str) -> list[str]:
     return list(dict.fromkeys([*imported, *(module for module in owners if module)]))
 
 
-def _overview(scripts: list[Path]) -> str:
+def _add_gallery(files: Any, config: Any, scripts: dict[str, Path]) -> None:
+    """Add the overview of the gallery, its scripts, and its part of the navigation, by fields."""
+    fields = {field: names.split() for field, names in FIELDS.items()}
+    named = {name for names in fields.values() for name in names}
+    fields["More"] = [name for name in scripts if name not in named]
     lines = [
         "# Gallery",
-        "Every page has the problem in words, the picture, the numbers beside their references, and the "
-        "code. Where a number is off, the example fails, and with it the tests.",
+        "Each page has the problem in words, the picture, the numbers beside their references, and the "
+        "script to download. If a number is off, the example fails, and with it the tests.",
     ]
-    for script in scripts:
-        title, *_ = _words(script)
-        lines.append(
-            f"[![{_title(script)}]({script.stem}.png){{ width=320 align=left }}]({script.stem}.md)\n"
-            f"**[{_title(script)}]({script.stem}.md)** — {' '.join(title.split())}\n\n"
-            '<div style="clear: both"></div>'
-        )
-    return "\n\n".join(lines) + "\n"
+    entries: list[Any] = ["gallery/index.md"]
+    for field, names in fields.items():
+        if there := [scripts[name] for name in names if name in scripts]:
+            lines += [f"## {field}", '<div class="cards pictures">', *map(_card, there), "</div>"]
+            entries.append({field: [{_title(script): f"gallery/{script.stem}.md"} for script in there]})
+    files.append(File.generated(config, "gallery/index.md", content="\n\n".join(lines) + "\n"))
+    for script in scripts.values():
+        content = script.read_text(encoding="utf-8")
+        files.append(File.generated(config, f"gallery/{script.name}", content=content))
+    for section in config.nav:
+        if "Gallery" in section:
+            section["Gallery"] = entries
 
 
-def _gallery_entries(config: Any) -> list[Any]:
-    """Return the list of the gallery in the navigation, made at the first call."""
-    found = [entry for entry in config.nav if "Gallery" in entry]
-    if not isinstance(found[0]["Gallery"], list):
-        found[0]["Gallery"] = []
-    entries: list[Any] = found[0]["Gallery"]
-    return entries
+def _card(script: Path) -> str:
+    title, *_ = _words(script)
+    return (
+        f'<a href="{script.stem}.html"><img src="{script.stem}.png" alt="" loading="lazy">'
+        f"<b>{_title(script)}</b><span>{' '.join(title.split())}</span></a>"
+    )
+
+
+def _notebook_name(stem: str) -> str:
+    return f"filippov_{'start' if stem == 'index' else stem}.ipynb"
+
+
+def _figure(match: re.Match[str]) -> str:
+    """Return a figure of the project in both colours, with its caption."""
+    alternative = re.sub(r"[$\\{}*`]", "", match["caption"])
+    pictures = "".join(
+        f"![{alternative}]({match['source']}{suffix}.svg#only-{ground})"
+        for suffix, ground in (("", "light"), (".dark", "dark"))
+    )
+    caption = f"<figcaption>{match['caption']}</figcaption>"
+    return f'<figure class="drawn" markdown="span">\n{pictures}\n{caption}\n</figure>'
+
+
+def _dark(svg: str) -> str:
+    """Return a figure in the colours of a dark page; Matplotlib leaves out the fill of black letters."""
+    recoloured = re.sub("|".join(DARK), lambda match: DARK[match[0]], svg)
+    letters = f'<style type="text/css">g[id^="text_"] {{fill: {DARK["#000000"]}}}</style>'
+    return recoloured.replace("<defs>", f"<defs>{letters}", 1)
 
 
 def _decisions(docs: Path) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -12,9 +13,11 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from readme_blocks import run_blocks  # noqa: E402
+from docs_notebooks import notebook  # noqa: E402
+from readme_blocks import blocks, run_blocks  # noqa: E402
 
 RUN = sorted(page for folder in ("tutorial", "howto", "compare") for page in (DOCS / folder).glob("*.md"))
+RUN += [DOCS / "index.md", DOCS / "start.md"]
 ALL = sorted(DOCS.rglob("*.md"))
 
 
@@ -32,6 +35,36 @@ def test_the_code_of_a_page_runs_and_prints_what_stands_there(
     drawn = {path.name for path in tmp_path.glob("*.png")}
     shown = set(re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", text))
     assert drawn == shown
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "tutorial").glob("*.md")), ids=lambda page: page.stem)
+def test_a_notebook_has_the_code_of_its_page(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    cells = json.loads(notebook(text))["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert code == [block.code.rstrip("\n") for block in blocks(page)]
+    words = "".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    assert words.startswith("# ")
+    assert "```text" not in words
+    assert not re.search(r"\]\((?!https?:)", words)
+    assert len({cell["id"] for cell in cells}) == len(cells)
+
+
+def test_every_theory_page_has_a_figure_that_is_there() -> None:
+    for page in (DOCS / "theory").glob("*.md"):
+        figures = re.findall(
+            r"^!\[[^]]+\]\((figures/\w+\.svg)\)$", page.read_text(encoding="utf-8"), re.MULTILINE
+        )
+        assert figures or page.stem == "index", page.name
+
+
+def test_formulas_are_marked_up() -> None:
+    """No formula is left in a block of code; each dollar sign has its partner."""
+    for page in (DOCS / "theory").glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r"^    \S.*=", text, re.MULTILINE), page.name
+        without_code = re.sub(r"```.*?```|`[^`\n]*`", "", text, flags=re.DOTALL)
+        assert without_code.count("$") % 2 == 0, page.name
 
 
 def test_an_output_that_differs_is_noticed(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Two genes that regulate each other by steps: all motions end where two thresholds meet, but one.
+"""A two-gene network with step-like regulation: all trajectories but one end where two thresholds meet.
 
     a' = -4.5 a + 40 [b > 4] [a < 8],    b' = -1.5 b + 40 [a > 4] [b < 8]
 

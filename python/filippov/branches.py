@@ -24,9 +24,9 @@ class Choice(NamedTuple):
     t : float
         Time of the point.
     mode : Mode
-        The mode in which the path goes on.
+        The mode in which the path continues.
     candidates : tuple of Mode
-        All modes in which a solution goes on; the one of this path is the first.
+        All modes in which a solution continues; the one of this path is the first.
     """
 
     t: float

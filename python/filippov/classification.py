@@ -90,7 +90,7 @@ class Classification:
             shown = ", ".join(f"{lam:.6g}" for lam in self.multipliers)
             with_multipliers = f", multipliers {shown}" if shown else ""
             rule = f" ({self.leaf or self.rule})" if len(self.surfaces) > 1 else ""
-            lines.append(f"goes on in mode {self.mode}{with_multipliers}{rule}")
+            lines.append(f"continues in mode {self.mode}{with_multipliers}{rule}")
         elif self.reason:
             lines.append(f"not decided: {self.reason}")
         else:

@@ -1,6 +1,6 @@
 """Exceptions and warnings of the package.
 
-Every error says what happened, where (time, state, surface, mode, as far as known) and what to try.
+Every message names the cause, the place (time, state, surface, mode, as far as known) and what to try.
 
 During a run nothing is raised for numerical reasons: the partial solution comes back with ``status``,
 ``message`` and ``success = False``. The exceptions here report bad input, models that cannot be used, and
@@ -86,7 +86,7 @@ class ToleranceError(InputError):
 
 
 class NonUniqueError(FilippovError):
-    """The solution is not unique at a point, and ``nonunique="error"`` was asked for.
+    """The solution is not unique at a point, with ``nonunique="error"``.
 
     `partial` is the solution up to that point, `candidates` are the modes (tuples of int) in which a solution
     can go on.
@@ -96,7 +96,7 @@ class NonUniqueError(FilippovError):
 
 
 class FilippovWarning(UserWarning):
-    """A result may not be what was meant.
+    """A result may not be the one that was intended.
 
     The text starts with the code of the warning, so that ``warnings.filterwarnings("ignore", code,
     fl.FilippovWarning)`` silences one kind. `Solution.warnings` keeps all of them.
@@ -136,7 +136,7 @@ class FilippovWarning(UserWarning):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a run. It is a `KeyboardInterrupt` with what was computed so far.
+    """Ctrl-C during a run. It is a `KeyboardInterrupt` with the part that was computed.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ class Event:
     ----------
     g : callable
         ``g(t, y, *args) -> float``, called with `y` of shape (n,) and the `args` of `solve_ivp`. Parameters
-        of the system that `g` names in its signature are handed over by name.
+        of the system that `g` names in its signature are passed by name.
     direction : {0, 1, -1, "both", "up", "down"}, optional
         Which passages count: upwards (`g` from negative to positive), downwards, or both (default).
         Any other number counts by its sign, as in SciPy.

@@ -87,8 +87,8 @@ def gradient(
     -------
     value : float
     gradient : dict of str to float
-        By the names of `wrt`. NaN, with a warning that says where, if the run passes an instant at which it
-        has no derivative.
+        By the names of `wrt`. NaN, with a warning that names the time, if the run passes an instant
+        at which it has no derivative.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def square(t: Any, period: Any, duty: Any = 0.5) -> Any:
 def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
     """Return the state of a relay with two thresholds: +1 once `value` has reached `high`, -1 once `low`.
 
-    Between the thresholds it is what it was; see `Hysteresis`, which is the same for a function of t and x.
+    Between the thresholds it does not change; see `Hysteresis`, which is the same for a function of t and x.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Hysteresis:
     """A relay with two thresholds, usable inside a right-hand side as a number, +1 or -1.
 
     It becomes +1 where ``h(t, x)`` reaches `high` from below, and -1 where it reaches `low` from above;
-    between the thresholds it is what it was.
+    between the thresholds it does not change.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Hysteresis:
     low, high : float, parameter or traced value
         The thresholds.
     initial : {-1, 1}, optional
-        The state at a start between the thresholds; beyond them `h` says it.
+        The state at a start between the thresholds; beyond them `h` determines it.
 
     Raises
     ------

@@ -150,7 +150,7 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 def where(condition: Any, plus: Any, minus: Any) -> Any:
     """Return `plus` where the condition holds and `minus` elsewhere, element by element.
 
-    The branch that is not taken is never looked at, so that it may be undefined there.
+    The branch that is not taken is never evaluated, so that it may be undefined there.
     """
     operands = [_visible(value) for value in (condition, plus, minus)]
     if any(isinstance(value, (Scalar, Condition)) or _is_object(value) for value in operands):

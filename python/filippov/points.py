@@ -129,7 +129,7 @@ class Points(ABC):
         >>> relays = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
         >>> relays.classify(0.0, [0.0, 0.0])
         intersection at x[0] = 0, x[1] = 0: several surfaces meet
-        goes on in mode 00, multipliers 0.5, -0.2 (only)
+        continues in mode 00, multipliers 0.5, -0.2 (only)
         >>> relays.classify(0.0, [0.0, 0.0], before="0+").mode
         Mode('00')
         """

@@ -38,7 +38,7 @@ class Reset:
         ``h(t, y, *args) -> float``: the reset happens where ``h`` reaches zero.
     map : callable, optional
         ``map(t, y, *args) -> y_after``, `n` numbers. Parameters and discrete states of the system that it
-        names in its signature are handed over by name, as to `h`. It may be left out if `set` is given.
+        names in its signature are passed by name, as to `h`. It may be left out if `set` is given.
     direction : {0, -1, 1, "both", "down", "up"}, optional
         0, the default: where `h` reaches zero from either side; -1: where it falls to zero; 1: where it
         rises to zero. A number counts by its sign.
@@ -50,7 +50,7 @@ class Reset:
         The reset happens at the times ``phase + k * period``, k any whole number, instead of at `h`.
     set : dict of str to float or callable, optional
         New values of discrete states of the system (``System(discrete=...)``): numbers, or functions
-        ``f(t, y, *args)`` of the state before the reset, with names handed over as to `map`.
+        ``f(t, y, *args)`` of the state before the reset, with names passed as to `map`.
 
     Raises
     ------

@@ -198,13 +198,13 @@ class Solution:
         Numbers of evaluations of the field, those for Jacobians by differences included, of Jacobians, and
         of factorisations; the last two are 0 unless ``method="Rodas5P"`` took steps.
     status : int
-        0: the end was reached; 1: a terminal event; negative: the run failed and what is here is a part.
+        0: the end was reached; 1: a terminal event; negative: the run failed, this is the part up to there.
     message : str
         The reason, in words.
     success : bool
         ``status >= 0``.
     switches : SwitchTable
-        Every change of mode; its column ``is_kink`` tells those apart at which the field is continuous.
+        Every change of mode; its column ``is_kink`` marks those at which the field is continuous.
     segments : SegmentTable
         Pieces of constant mode.
     stats : dict
@@ -227,7 +227,7 @@ class Solution:
 
     Notes
     -----
-    A field is made when it is first asked for.
+    A field is made when it is first read.
 
     A copy by `pickle` has everything but `sol`, which is ``None`` there: ask for the times with `t_eval`.
     """
@@ -276,7 +276,7 @@ class Solution:
         dense_output : bool
             Whether `sol` is kept.
         wanted : Wanted or None
-            By what the run was differentiated.
+            The quantities by which the run was differentiated.
         events : tuple of EventSpec
             The events, for the derivatives of their times.
 
@@ -446,7 +446,7 @@ class Solution:
         -------
         ndarray, shape (n, len(wrt)) or (n, len(wrt), k); for order 2 (n, len(wrt), len(wrt)) or with k behind
             Discrete states with names have rows behind those of the n states. NaN from an instant on at which
-            there is no derivative; ``sol.switches[i].derivative.lost`` says why.
+            there is no derivative; ``sol.switches[i].derivative.lost`` has the reason.
 
         Raises
         ------
@@ -684,7 +684,7 @@ class Solution:
         ----------
         fun : callable
             ``fun(t, x, *args) -> float``, as the right-hand side of the system; parameters that its signature
-            names are handed over by name. So is ``contact``: what `contact_acceleration` returns, by the name
+            names are passed by name. So is ``contact``: the values of `contact_acceleration`, by the name
             of the reset, by the printed surface, or by its index.
         t : float or array_like, shape (k,), optional
             Times; by default those of the field `t`.

@@ -85,15 +85,18 @@ def solve_ivp(
     y0 : array_like, shape (n,)
         Initial state, real and finite.
     method : str, optional
-        ``"auto"`` (default): Taylor series of the motions where the right-hand side is traced and analytic,
-        up to sliding on one surface; else ``"DOPRI5"``; from where the run turns out to be stiff,
-        ``"Rodas5P"``. ``"Taylor"``: series wherever there are any,
-        whatever their cost; a motion without goes on with DOPRI5, and a warning says so. ``"DOPRI5"`` (or
-        ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince. ``"DOP853"``: that of order 8, for
-        high accuracy where there are no series. ``"Rodas5P"``: for stiff motions, in every mode; Jacobians
-        from the traced function, by differences for a black box. ``"Midpoint"``: the rule of order 2 as Dieci
-        and Lopez use it, which never evaluates the field of a region beyond a surface; for comparisons.
-        ``sol.stats["method"]`` says what took the steps ("none" if there was no step).
+        * ``"auto"`` (default): Taylor series if the right-hand side is traced and analytic, otherwise
+          ``"DOPRI5"``; ``"Rodas5P"`` from the time at which the run turns out to be stiff.
+        * ``"Taylor"``: series for every motion that has them, whatever they cost. Motions without series use
+          DOPRI5, with a warning.
+        * ``"DOPRI5"`` (or ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince.
+        * ``"DOP853"``: the pair of order 8, for high accuracy without series.
+        * ``"Rodas5P"``: for stiff motions, in every mode. Jacobians come from the traced function, and from
+          differences for a black box.
+        * ``"Midpoint"``: the rule of order 2 of Dieci and Lopez, which never evaluates the field of a region
+          beyond a surface; for comparisons.
+
+        ``sol.stats["method"]`` names the methods that took steps ("none" if there was no step).
     t_eval : array_like, shape (k,), optional
         Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of
         the steps.
@@ -123,12 +126,12 @@ def solve_ivp(
     sliding : str or SlidingPolicy, optional
         Which combination of the 2**m fields slides where m >= 2 surfaces meet: ``"canopy"`` (default),
         ``"moments"``, ``"minimum-norm"`` or ``"dieci-lopez"``; on one surface it is Filippov's. A
-        `SlidingPolicy` has the rule, the scaling `kappa` of the surfaces, what keeps sliding motions on their
-        surfaces (`stabilization`), and the largest number of branches (`max_branches`).
+        `SlidingPolicy` combines the rule with the scaling `kappa` of the surfaces, the way in which sliding
+        motions are kept on their surfaces (`stabilization`), and the largest number of branches.
     nonunique : {"regularize", "error", "branch"}, optional
-        What to do where the solution is not unique: follow the limit of the regularised system and note the
-        alternatives in `warnings`; raise `NonUniqueError`; or follow all alternatives: the solution returned
-        is that of ``"regularize"``, and its `branches` are all of them, see `Branches`.
+        What to do where the solution is not unique. ``"regularize"``: follow the limit of the regularised
+        system and list the alternatives in `warnings`. ``"error"``: raise `NonUniqueError`. ``"branch"``:
+        follow all alternatives; the result is that of ``"regularize"``, with all in `branches`.
     keep : {"steps", "switches", "last"}, optional
         What is kept: every step; the switches and the segments between them (`t` are their times and the
         ends); or the last state only, so that the memory of a run does not grow with its length. Zeros of
@@ -141,9 +144,9 @@ def solve_ivp(
         Print how far the run is, or call a function of the time reached. What that raises ends the run, and
         is raised again with the solution up to there as `partial`.
     wrt : str or sequence of str, optional
-        By what the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` for all
-        of these, ``"all"`` for the states and them. `Solution.derivative` and ``sol.switches.dt`` are the
-        derivatives. Default: none are followed.
+        The quantities by which the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters,
+        ``"params"`` for all of these, ``"all"`` for the states and them. `Solution.derivative` and
+        ``sol.switches.dt`` are the derivatives. Default: none are followed.
     order : {1, 2}, optional
         Up to which order derivatives are followed.
 

@@ -211,7 +211,7 @@ class RunWarning(NamedTuple):
     message : str
         What was found, in words.
     candidates : tuple of Mode
-        For ``"non_unique"`` all modes in which a solution goes on, the chosen one first; else empty.
+        For ``"non_unique"`` all modes in which a solution continues, the chosen one first; otherwise empty.
     surfaces : tuple of str
         The printed switching functions that it is about; empty if it is about the motion.
     rule : str
@@ -519,7 +519,7 @@ def import_pandas() -> Any:
     try:
         return import_module("pandas")
     except ImportError as error:
-        raise ImportError("to_pandas() needs pandas: pip install filippov[pandas]") from error
+        raise ImportError("to_pandas() needs pandas: pip install pandas") from error
 
 
 def import_xarray() -> Any:

@@ -20,6 +20,5 @@ def need(package: str, purpose: str) -> Any:
         return import_module(package)
     except ImportError as error:
         raise ImportError(
-            f"{purpose} needs {package}, which is not installed: pip install {package}, or all that the "
-            'analysis can use: pip install "filippov[analysis]"'
+            f"{purpose} needs {package}, which is not installed: pip install {package}"
         ) from error

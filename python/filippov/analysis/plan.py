@@ -70,7 +70,7 @@ def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
     Raises
     ------
     Interrupted
-        On Ctrl-C; `partial` is the table of all points, with what was computed of them.
+        On Ctrl-C; `partial` is the table of all points, with the part of them that was computed.
     """
     tables: list[Table] = []
     try:

@@ -50,8 +50,8 @@ def poincare(
     system : System
         The system; it stays traced, so that other calls cost no tracing.
     section : Section, Phase, Tangency, callable, str or int
-        Where the motion is looked at: a function ``h_P(t, x)``, a surface of the system by its name or index,
-        a phase, a tangency.
+        The set at which the trajectory is recorded: a function ``h_P(t, x)``, a surface of the system by its
+        name or index, a phase, a tangency.
     t_span : (float, float)
         Longest interval of time. For ``Phase(period)`` with `n` the end may be ``np.inf``.
     y0 : array_like, shape (n_states,)

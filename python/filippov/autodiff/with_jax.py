@@ -17,7 +17,7 @@ try:
     import jax
     import jax.numpy as jnp
 except ImportError as error:
-    raise ImportError("filippov.autodiff.with_jax needs JAX: pip install filippov[jax]") from error
+    raise ImportError("filippov.autodiff.with_jax needs JAX: pip install jax") from error
 
 __all__ = ["solve"]
 

@@ -16,7 +16,7 @@ try:
     import torch
     from torch.autograd.function import once_differentiable
 except ImportError as error:
-    raise ImportError("filippov.autodiff.with_torch needs PyTorch: pip install filippov[torch]") from error
+    raise ImportError("filippov.autodiff.with_torch needs PyTorch: pip install torch") from error
 
 __all__ = ["solve"]
 

@@ -47,7 +47,7 @@ def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError as error:
-        raise ImportError('--parquet needs PyArrow: pip install "filippov[parquet]"') from error
+        raise ImportError("--parquet needs PyArrow: pip install pyarrow") from error
     table = arrow.table(_columns(solution))
     parquet.write_table(table.replace_schema_metadata(notes), path)
 

@@ -3,7 +3,7 @@
 Every function takes ``ax=`` and returns it, draws on a light or a dark ground (``dark=``, or `style` around
 many figures), and has a colour of its own for each mode.
 
-Needs Matplotlib: ``pip install filippov[plot]``.
+Needs Matplotlib: ``pip install matplotlib``.
 """
 
 from __future__ import annotations

@@ -174,7 +174,7 @@ def import_pyplot() -> Any:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError("plotting needs Matplotlib: pip install filippov[plot]") from error
+        raise ImportError("plotting needs Matplotlib: pip install matplotlib") from error
     return pyplot
 
 
