@@ -422,3 +422,40 @@ def test_cycles_travel() -> None:
     again = pickle.loads(pickle.dumps(cycle))
     np.testing.assert_array_equal(again.y0, cycle.y0)
     assert again.derivative("F").period == cycle.derivative("F").period
+
+
+def test_curves_in_two_parameters_travel(tmp_path: Any) -> None:
+    system = friction(omega=0.55)
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "omega", (0.5, 0.6))
+    (crossing,) = branch.special["CS"]
+    curve = fl.continuation(crossing, ("F", "omega"), {"F": (0.38, 0.5), "omega": (0.1, 2.0)})
+    fl.cycles.save_branch(curve, tmp_path / "curve.json")
+    exact = float(POINTS["dry_friction_crossing_sliding"]["points"][2]["omega"])
+    for again in (
+        pickle.loads(pickle.dumps(curve)),
+        fl.cycles.load_branch(tmp_path / "curve.json", system),
+    ):
+        np.testing.assert_array_equal(again.values("omega"), curve.values("omega"))
+        assert abs(again.at(F=0.5).params["omega"] - exact) < 1e-10
+
+
+def test_the_data_of_branches_are_written_as_netcdf(tmp_path: Any) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("scipy.io")
+    cycles = fl.continuation(fl.limit_cycle(friction(omega=0.7), [1.0, 2.0]), "omega", (0.5, 0.9))
+    rests = fl.continuation(
+        fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4]), "alpha", (0.25, 0.6)
+    )
+    for branch, name in ((cycles, "multipliers"), (rests, "eigenvalues")):
+        path = tmp_path / f"{name}.nc"
+        branch.data.to_netcdf(path, engine="scipy")
+        with xarray.open_dataset(path, engine="scipy") as again:
+            assert again.attrs == branch.data.attrs
+            for variable, values in branch.data.items():
+                np.testing.assert_array_equal(again[variable].values, values.values)
+            parts = again[name]
+            found = parts.sel(part="real").values + 1j * parts.sel(part="imag").values
+        np.testing.assert_array_equal(found, getattr(branch, name))
+        assert np.any(found.imag != 0)
+    with pytest.raises(fl.InputError, match="multipliers: only branches of cycles"):
+        _ = rests.multipliers

@@ -225,3 +225,32 @@ def test_a_reset_that_forgets_the_state_keeps_the_delay() -> None:
     assert cycle.n_zero == 0
     np.testing.assert_allclose(cycle.multipliers, [1.0], atol=1e-10)
     assert cycle.is_stable
+
+
+@pytest.mark.parametrize(
+    ("fun", "period"),
+    [
+        (lambda t, x: [x[1], -4 * x[0]], lambda start: np.pi),
+        # A quarter of a turn lasts as long as its square side, abs(x) + abs(y).
+        (lambda t, x: [np.sign(x[1]), -np.sign(x[0])], lambda start: 4 * np.sum(np.abs(start))),
+    ],
+    ids=["harmonic", "two relays"],
+)
+def test_one_cycle_of_a_family_is_neutral(fun: Any, period: Any) -> None:
+    cycle = fl.limit_cycle(fl.System(fun, n=2), [1.0, 0.3])
+    assert abs(cycle.period - period(cycle.y0)) < 1e-9
+    np.testing.assert_allclose(np.abs(cycle.multipliers), 1.0, atol=1e-6)
+    assert "neutral" in repr(cycle)
+
+
+def test_a_cycle_of_a_family_has_no_derivative() -> None:
+    center = fl.System(lambda t, x, k=2.0: [x[1], -k * x[0]], n=2)
+    with pytest.raises(fl.ModelError, match="family"):
+        fl.limit_cycle(center, [1.0, 0.3]).derivative("k")
+
+
+def test_an_equilibrium_is_no_cycle() -> None:
+    # Its period would be whatever the guess is.
+    center = fl.System(lambda t, x: [x[1], -x[0]], n=2)
+    with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
+        fl.limit_cycle(center, [1.0, 0.3], period=6.0, transient=0)

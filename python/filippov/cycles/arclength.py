@@ -16,6 +16,7 @@ __all__ = ["Curve", "Step", "corrected", "tangent_of"]
 
 _TOLERANCE = 1e-11
 _MOST_STEPS = 12
+_ABSURD = 1e4
 
 
 class Curve(Protocol):
@@ -92,7 +93,7 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
         except np.linalg.LinAlgError:
             change = -np.linalg.lstsq(matrix, right, rcond=None)[0]
         size = float(np.max(np.abs(change)))
-        if not np.isfinite(size):
+        if not size < _ABSURD:
             break
         w = w + change * scale
         # Newton's method squares what is left.

@@ -6,8 +6,8 @@ chapter 8.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from filippov.errors import InputError, ModelError
 from filippov.scalars import positive
 from filippov.unknown import did_you_mean
 
-__all__ = ["curve_in_two"]
+__all__ = ["OnCurve", "curve_in_two"]
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.04, 1e-6
 _PROBES = ("CS", "SS", "GS", "AS", "GR")
@@ -173,11 +173,7 @@ def curve_in_two(
     special = [s._replace(point=max(last - s.point - 1, 0)) for s in sides[0].special[::-1]]
     special += [s._replace(point=s.point + last) for s in sides[1].special]
     reasons = {"one way": sides[0].reason, "other way": sides[1].reason}
-
-    def at_value(near: State, name: str, value: float) -> State:
-        return _at_value(start, near, (names, sizes), name, value)
-
-    return Branch(points, special, reasons, names, at_value=at_value)
+    return Branch(points, special, reasons, names, at_value=OnCurve(start, names, sizes))
 
 
 def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
@@ -187,19 +183,32 @@ def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
     return _Extended(curve, _SpectralCondition(curve, start))
 
 
-def _at_value(
-    start: Special, near: State, parameters: tuple[tuple[str, ...], Sequence[float]], name: str, value: float
-) -> State:
-    """Return the point of the curve of a special point at a value of one of the parameters."""
-    names, sizes = parameters
-    curve, w = curve_of(near, names, tuple(sizes))
-    extended = _extended(curve, start, w)
-    place = len(w) - 2 + names.index(name)
-    unit = np.zeros(len(w))
-    unit[place] = 1.0
-    w[place] = value
-    point = corrected(extended, w, curve.scales(w), unit)
-    return curve.state(point.w, point.error)
+class OnCurve(NamedTuple):
+    """The points of the curve of a special point, by the value of one of both parameters.
+
+    Attributes
+    ----------
+    start : Special
+    names : tuple of str
+        The parameters.
+    sizes : tuple of float
+        The sizes by which they are measured.
+    """
+
+    start: Special
+    names: tuple[str, ...]
+    sizes: tuple[float, ...]
+
+    def __call__(self, near: State, name: str, value: float) -> State:
+        """Return the point at a value of a parameter, near another one."""
+        curve, w = curve_of(near, self.names, self.sizes)
+        extended = _extended(curve, self.start, w)
+        place = len(w) - 2 + self.names.index(name)
+        unit = np.zeros(len(w))
+        unit[place] = 1.0
+        w[place] = value
+        point = corrected(extended, w, curve.scales(w), unit)
+        return curve.state(point.w, point.error)
 
 
 class _CurveSide:

@@ -21,7 +21,7 @@ from filippov.cycles.forcing import (
 )
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.shooting import Period, Shooting, Shot, solve
+from filippov.cycles.shooting import Period, Shooting, Shot, scales, solve
 from filippov.errors import InputError, ModelError
 from filippov.events import Event, accepted_names
 from filippov.modes import Mode
@@ -35,6 +35,7 @@ __all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
 
 _MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
+_SINGULAR = 1e-12
 
 
 class CycleDerivative(NamedTuple):
@@ -223,12 +224,18 @@ class Cycle:
         ------
         InputError
             If there is no such parameter.
+        ModelError
+            If the cycle is not isolated.
         """
         if name not in self.params or name in self.system.discrete:
             raise InputError(f"name: the system has no parameter {name!r}{did_you_mean(name, self.params)}")
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian
+        if np.linalg.cond(jacobian[:, :size] * scales(shooting, self._u)) > 1 / _SINGULAR:
+            raise ModelError(
+                f"name: the cycle is one of a family or at a fold, with no derivative by {name!r}"
+            )
         solved = np.linalg.solve(jacobian[:, :size], -jacobian[:, size])
         du: Array = np.asarray(solved, dtype=np.float64)
         states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]

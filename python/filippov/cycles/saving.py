@@ -12,6 +12,7 @@ import numpy as np
 
 from filippov.cycles.branch import Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle
+from filippov.cycles.curves import OnCurve
 from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
@@ -46,6 +47,10 @@ def save_branch(branch: Branch, path: str | os.PathLike[str]) -> None:
         "points": [_point(point) for point in branch.points],
         "special": [_special(special) for special in branch.special],
     }
+    if isinstance(branch._at_value, OnCurve):
+        start = branch._at_value.start
+        start = start._replace(params={name: start.state.params[name] for name in branch.names})
+        data["curve of"] = {"start": _special(start), "sizes": branch._at_value.sizes}
     target = Path(path)
     beside = target.with_name(target.name + ".part")
     beside.write_text(json.dumps(data))
@@ -96,20 +101,25 @@ def load_branch(
         Point(row["params"], build.state(row), {tuple(_tupled(key)): value for key, value in row["tests"]})
         for row in data["points"]
     ]
-    special = [
-        Special(
-            row["code"],
-            row["kind"],
-            row["surface"],
-            np.nan if row["t"] is None else row["t"],
-            row["params"],
-            row["point"],
-            build.state(row),
-            None if row["test"] is None else tuple(_tupled(row["test"])),
-        )
-        for row in data["special"]
-    ]
-    return Branch(points, special, data["reasons"], data["names"], data["monitors"], at_value)
+    special = [_read_special(row, build) for row in data["special"]]
+    on_branch: Callable[[State, str, float], State] = at_value
+    if "curve of" in data:
+        start = _read_special(data["curve of"]["start"], build)
+        on_branch = OnCurve(start, tuple(data["names"]), tuple(data["curve of"]["sizes"]))
+    return Branch(points, special, data["reasons"], data["names"], data["monitors"], on_branch)
+
+
+def _read_special(row: Mapping[str, Any], build: _Builder) -> Special:
+    return Special(
+        row["code"],
+        row["kind"],
+        row["surface"],
+        np.nan if row["t"] is None else row["t"],
+        row["params"],
+        row["point"],
+        build.state(row),
+        None if row["test"] is None else tuple(_tupled(row["test"])),
+    )
 
 
 def _tupled(value: Any) -> Any:

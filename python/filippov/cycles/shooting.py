@@ -23,6 +23,11 @@ __all__ = ["Passage", "Period", "Shooting", "Shot", "scales", "solve"]
 
 Period = GivenPeriod | InferredPeriod | None
 _MOST_STEPS = 30
+# A step of so many sizes of a cycle is one of equations that are singular but for rounding; so is a much
+# shorter one where the equations hold to rounding.
+_ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
+# A cycle whose velocities fall to such a share is an equilibrium.
+_SHRUNK = 1e-6
 
 
 class Passage(NamedTuple):
@@ -280,10 +285,13 @@ def solve(
     u = u.copy()
     best = np.inf
     first = sum(shooting.parts(u)[1])
+    at_first = 0.0
     for step in range(most):
         shot = shooting.shoot(u)
-        change = _newton_step(shot.jacobian[:, : shooting.size], shot.residual)
-        size = float(np.max(np.abs(change) / scales(shooting, u)))
+        at_first = at_first or _fastest(shot)
+        jacobian, scale = shot.jacobian[:, : shooting.size], scales(shooting, u)
+        change, is_singular = _newton_step(jacobian, shot.residual, scale)
+        size = float(np.max(np.abs(change) / scale))
         if not np.isfinite(size):
             break
         # Far from the cycle a step is no longer than the cycle.
@@ -291,21 +299,41 @@ def solve(
         if not 0.02 * first < sum(shooting.parts(u)[1]) < 50 * first:
             break
         if size < tol or (size < 1e-9 and size >= 0.5 * best):
-            return u, shooting.shoot(u), size
+            if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
+                break
+            found = shooting.shoot(u)
+            if _fastest(found) < _SHRUNK * at_first:
+                raise ModelError("Newton's method leads to an equilibrium, and to no cycle")
+            return u, found, size
         best = min(best, size)
         if step > 8 and size > 10.0:
             break
     raise ModelError(
-        f"Newton's method does not converge to a cycle with this itinerary: the last step was {size:.2g} of "
-        "the size of the cycle"
+        f"Newton's method does not converge to a cycle with this itinerary: its steps do not become shorter "
+        f"than {best:.2g} of the size of the cycle"
     )
 
 
-def _newton_step(jacobian: Array, residual: Array) -> Array:
+def _fastest(shot: Shot) -> float:
+    """Return the largest velocity at the ends of the legs."""
+    velocities = [passage.leg.velocities for passage in shot.passages]
+    return max(float(np.max(np.abs(v))) for pair in velocities for v in pair)
+
+
+def _newton_step(jacobian: Array, residual: Array, scale: Array) -> tuple[Array, bool]:
+    """Return the step, and whether the equations are singular: then it is the shortest one.
+
+    They are so for one of a family of cycles, of a system with a constant of motion.
+    """
     try:
-        return np.asarray(-np.linalg.solve(jacobian, residual))
+        step = np.asarray(-np.linalg.solve(jacobian, residual))
+        size = np.max(np.abs(step) / scale)
+        is_solved = np.all(np.abs(residual) < _ROUNDING * (np.abs(jacobian) @ scale))
+        if size < (_LONG_BY_ROUNDING if is_solved else _ABSURD):
+            return step, False
     except np.linalg.LinAlgError:
-        return np.asarray(-np.linalg.lstsq(jacobian, residual, rcond=None)[0])
+        pass
+    return np.asarray(-np.linalg.lstsq(jacobian * scale, residual, rcond=_SINGULAR)[0] * scale), True
 
 
 def _shorter(shooting: Shooting, u: Array, change: Array) -> float:
