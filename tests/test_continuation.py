@@ -459,3 +459,65 @@ def test_the_data_of_branches_are_written_as_netcdf(tmp_path: Any) -> None:
         assert np.any(found.imag != 0)
     with pytest.raises(fl.InputError, match="multipliers: only branches of cycles"):
         _ = rests.multipliers
+
+
+def test_doubled_branches_return_to_the_single_cycle() -> None:
+    # Between two period doublings, over two folds of the doubled cycle and two more grazings of the wall, at
+    # which it turns back: each direction finds the same points once.
+    cycle = fl.limit_cycle(impacts("impact_flip", omega="2.4", s="0"), [0.001, 0.67], t0=2.49)
+    single = fl.continuation(cycle, "omega", (0.95, 2.9))
+    exact = [float(point["omega"]) for point in POINTS["impact_flip"]["points"][:2]]
+    ways = [fl.continuation(point, "omega", (0.95, 2.9)) for point in single.special["PD"][:2]]
+    there, back = ([(s.code, s.params["omega"]) for s in way.special] for way in ways)
+    for way, end in zip(ways, exact[::-1], strict=True):
+        assert "comes back to one of half the period" in way.reasons["above"]
+        assert abs(way.special[-1].params["omega"] - end) < 1e-8
+        assert way.special[-1].state.period * 2 == pytest.approx(way.points[-1].state.period, rel=1e-4)
+    assert [code for code, _ in back] == ["GR", "LP", "PD", "PD", "LP", "GR", "PD"]
+    # The other direction sees them in the other order; its end is where this one starts.
+    np.testing.assert_allclose([at for _, at in there[:-1]], [at for _, at in back[-2::-1]], atol=1e-8)
+    for way in ways:
+        assert bool(way.admissible.all())
+
+
+def ring(t: float, z: Any, mu: float = 0.7) -> list[Any]:
+    """Return an unstable circle of radius mu, inside a wall at x = 1 that is slid on."""
+    x, y = z
+    grow = 0.05 * (x**2 + y**2 - mu**2)
+    outside = np.sign(x - 1) > 0
+    return [np.where(outside, -1.0, x * grow - y), np.where(outside, 0.0, y * grow + x)]
+
+
+def test_branches_turn_back_at_grazing_sliding() -> None:
+    # An unstable circle and a stable cycle that slides meet where the circle touches the wall, at mu = 1; the
+    # other side of it has neither.
+    system = fl.System(ring, n=2)
+    slides = fl.limit_cycle(system, [0.0, -0.9])
+    circle = fl.limit_cycle(system, [0.0, -0.7], period=6.28, transient=0)
+    for start in (slides, circle):
+        branch = fl.continuation(start, "mu", (0.5, 1.2))
+        (grazing,) = branch.special["GS"]
+        assert abs(grazing.params["mu"] - 1.0) < 1e-8
+        assert branch.reasons["above"] == "mu = 0.5 is the end of the range"
+        assert bool(branch.admissible.all())
+        assert np.max(branch.values("mu")) < 1.0 + 1e-8
+        assert np.array_equal(branch.stable, branch.data.n_zero.values == 1)
+        for cycle in (branch.points[0].state, branch.points[-1].state):
+            n_legs = len(cycle.itinerary.legs)
+            assert n_legs == (2 if cycle.is_stable else 1)
+    again = fl.limit_cycle(system, [0.0, -0.9], {"mu": 0.5})
+    ends = [branch.points[k].state for k in (0, -1)]
+    assert min(abs(again.period - end.period) for end in ends) < 1e-9
+
+
+def test_branches_turn_back_where_an_impact_begins() -> None:
+    # From the cycle without impacts, to the fold of the cycles with one, which is beyond the grazing.
+    system = impacts("impact_fold", omega="1.8", s="-0.5")
+    w, size = 1.8, (1 - 1.8**2) ** 2 + (0.1 * 1.8) ** 2
+    free = fl.limit_cycle(system, [(1 - w**2) / size, 0.1 * w**2 / size], transient=3)
+    branch = fl.continuation(free, "omega", (1.5, 2.2))
+    grazing = float(POINTS["impact_grazing"]["points"][0]["omega"])
+    fold = float(POINTS["impact_fold"]["points"][0]["omega"])
+    assert abs(branch.special["GR"][0].params["omega"] - grazing) < 1e-8
+    assert abs(branch.special["LP"][0].params["omega"] - fold) < 1e-8
+    assert bool(branch.admissible.all())

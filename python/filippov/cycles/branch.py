@@ -284,8 +284,9 @@ class Branch:
     def data(self) -> Any:
         """The branch as an xarray Dataset with the dimension `point`.
 
-        Files of NetCDF have no complex numbers: `multipliers` and `eigenvalues` have the dimension `part`, for
-        the real and the imaginary part. As complex arrays they are `Branch.multipliers` and `eigenvalues`.
+        Files of NetCDF have no complex numbers: `multipliers` and `eigenvalues` have the dimension `part`,
+        for the real and the imaginary part. As complex arrays they are `Branch.multipliers` and
+        `Branch.eigenvalues`.
         """
         xarray = need("xarray", "a branch as a Dataset")
         first = self.points[0].state

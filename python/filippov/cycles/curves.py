@@ -7,7 +7,7 @@ chapter 8.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -183,10 +183,10 @@ def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
     return _Extended(curve, _SpectralCondition(curve, start))
 
 
-class OnCurve(NamedTuple):
+class OnCurve:
     """The points of the curve of a special point, by the value of one of both parameters.
 
-    Attributes
+    Parameters
     ----------
     start : Special
     names : tuple of str
@@ -195,9 +195,8 @@ class OnCurve(NamedTuple):
         The sizes by which they are measured.
     """
 
-    start: Special
-    names: tuple[str, ...]
-    sizes: tuple[float, ...]
+    def __init__(self, start: Special, names: tuple[str, ...], sizes: tuple[float, ...]) -> None:
+        self.start, self.names, self.sizes = start, names, sizes
 
     def __call__(self, near: State, name: str, value: float) -> State:
         """Return the point at a value of a parameter, near another one."""

@@ -21,6 +21,7 @@ from filippov.cycles.forcing import (
 )
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
+from filippov.cycles.probes import end_probes_of
 from filippov.cycles.shooting import Period, Shooting, Shot, scales, solve
 from filippov.errors import InputError, ModelError
 from filippov.events import Event, accepted_names
@@ -31,11 +32,11 @@ from filippov.solution import Solution
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
+__all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "limit_cycle", "turns_of"]
 
 _MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
-_SINGULAR = 1e-12
+_SINGULAR, _ROUNDING = 1e-12, 1e-9
 
 
 class CycleDerivative(NamedTuple):
@@ -313,7 +314,9 @@ def _slopes_of(
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
-    """Whether a run from within a cycle makes its pieces."""
+    """Whether its pieces end as they should, and a run from within a cycle makes them."""
+    if any(probe.value < -_ROUNDING for probe in end_probes_of(cycle._shooting, cycle._shot)):
+        return False
     (t, x), period = cycle.inside(), cycle.period
     try:
         record = cycle._shooting.motions.record((t, t + 1.02 * period), x)
@@ -328,7 +331,7 @@ def follows_itinerary(cycle: Cycle) -> bool:
     end = record.solution.sol(t + period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
-    return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
+    return bool(is_same and np.max(np.abs(end - x)) < (1e-6 + 1e-9 * growth) * size)
 
 
 def _kinds(itinerary: Itinerary) -> list[object]:
@@ -597,7 +600,7 @@ def _repeated_forced(
             forcing.multiple = multiple
             try:
                 found = cycle_at(motions, start, points[:, 0], multiple * single, forcing)
-                turns = _turns(found, multiple)
+                turns = turns_of(found, multiple)
                 if turns > 1:
                     forcing.multiple = multiple // turns
                     found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
@@ -650,7 +653,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
-                    turns = _turns(found, len(found.itinerary.legs))
+                    turns = turns_of(found, len(found.itinerary.legs))
                     if turns > 1:
                         found = cycle_at(motions, *found.inside(), found.period / turns, None)
                     if _attracts(found):
@@ -687,7 +690,7 @@ def _attracts(cycle: Cycle) -> bool:
     return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
 
 
-def _turns(cycle: Cycle, most: int) -> int:
+def turns_of(cycle: Cycle, most: int) -> int:
     """Return how many times a cycle goes round another one, at most so many times."""
     size = 1e-8 * np.max(np.abs(np.array(cycle.itinerary.starts)))
     t, x = cycle.t0 + 0.381966 * cycle.period / most, None

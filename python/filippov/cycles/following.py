@@ -15,13 +15,14 @@ import numpy as np
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
-from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
+from filippov.cycles.cycle import Cycle, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
-from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
+from filippov.cycles.passing import SHORT, back_from_change, beyond_change, flow_near, without_short_leg
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.switching import single_at_doubling
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import count, positive
@@ -33,6 +34,9 @@ AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _WIDTH = 1e-13
+_SAME_HALVES = 1e-9
+# How near to 1 or -1 a multiplier is at a fold or a period doubling.
+_CRITICAL = 1e-3
 _SAVED_EVERY = 50
 # Their test functions change signs with the direction.
 _TURNING = ("LP", "PSN", "BP")
@@ -319,7 +323,8 @@ class _Side:
             except ModelError as error:
                 del self.special[n_special:]
                 is_long = ds > (_SHORTEST_STEP if isinstance(self.here.curve, EquilibriumCurve) else 4e-3)
-                if not is_long and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
+                is_vanishing = not is_long or self._leg_vanishes_within(ds)
+                if is_vanishing and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
                     if self.is_stopped:
                         return
                     ds = min(self.settings.step, 4 * ds)
@@ -369,6 +374,10 @@ class _Side:
             return False
         self.points.pop()
         value = self.points[-1].params[self.settings.name]
+        # Its multiplier is 1 there, and the branch comes back inside out: that is no fold.
+        self.special = [
+            s for s in self.special if s.code not in ("LP", "BP") or s.point < len(self.points) - 1
+        ]
         self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
         return True
 
@@ -398,6 +407,8 @@ class _Side:
 
     def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
+        if self._is_single_again(following):
+            return False
         before, after = self.here.tests, following.tests
         wanted = {*CHANGES, *self.settings.detect}
         common = [key for key in after if key in before and key[0] in wanted]
@@ -419,6 +430,34 @@ class _Side:
         state = curve.state(step.w, step.error)
         curve.refer_to(step.w)
         self._go_on(following, state)
+        return True
+
+    def _is_single_again(self, following: _Position) -> bool:
+        """Whether a cycle of two alike halves has become one that is followed twice: behind it they swap."""
+        curve = self.here.curve
+        if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
+            return False
+        halves = [_difference_of_halves(curve, place.w) for place in (self.here, following)]
+        before, after = halves
+        if before is None or after is None:
+            return False
+        size = np.linalg.norm(before)
+        if size < _SAME_HALVES or (before @ after > 0 and np.linalg.norm(after) > _SAME_HALVES):
+            return False
+        self.reason = "the cycle comes back to one of half the period, followed twice"
+        try:
+            there = single_at_doubling(curve, self.here.w, following.w)
+        except ModelError:
+            return True
+        name, near = self.settings.name, 1e-6 * self.settings.size
+        # The fold of the doubled branch in its own middle is this point.
+        self.special = [
+            special
+            for special in self.special
+            if special.code not in ("LP", "BP") or abs(special.params[name] - there.params[name]) > near
+        ]
+        self._add("PD", ("PD",), curve, there)
+        self.reason += f", at {CODES['PD']} {name} = {there.params[name]:.12g}"
         return True
 
     def _located(self, start: _Position, key: Any, end: _Position) -> tuple[float, Any, Step]:
@@ -478,20 +517,23 @@ class _Side:
             here = curve.state(located.w, located.error)
             following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
         else:
-            for reach in (1.0, 3.0, 0.3):
-                w = located.w + reach * (beyond - located.w)
-                new = _flow_near(curve, w)
-                if new is not None and not new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
-                    following = new, direction
-                    break
-            if following is None and key[3] == "end":
-                following = _without_leg(curve, key[1], located, self.settings)
+            new = beyond_change(curve, located, beyond)
+            following = back_from_change(curve, key, located) if new is None else (new, direction)
         if following is None:
             what = "equilibrium" if isinstance(curve, EquilibriumCurve) else "cycle of the flow"
             self.reason = f"behind {self.special[-1]!r} no {what} was found"
             return False
         self._go_on(self._position(*following), following[0])
         return True
+
+    def _leg_vanishes_within(self, ds: float) -> bool:
+        """Whether a leg that is short already would have no duration after a step."""
+        curve, w, tangent, _ = self.here
+        if not isinstance(curve, CycleCurve):
+            return False
+        own = slice(curve.shooting.m * curve.shooting.n, curve.shooting.m * (curve.shooting.n + 1))
+        now, then = (v[own] for v in (w, w + ds * tangent * curve.scales(w)))
+        return bool(np.any((then <= 0) & (now < SHORT * np.sum(now))))
 
     def _goes_beyond_a_vanishing_leg(self, ds: float) -> bool:
         """Go on behind the point at which a leg vanishes, if there is one."""
@@ -500,21 +542,46 @@ class _Side:
             return False
         scale = curve.scales(w)
         direction = float(np.sign(tangent[-1])) or self.direction
+        value = float(w[-1])
         for reach in (1.0, 2.0, 4.0):
-            new = _flow_near(curve, w + reach * ds * tangent * scale)
+            new = flow_near(curve, w + reach * ds * tangent * scale)
             if new is None or new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
                 continue
-            try:
-                back = self._position(new, -direction)
-                self._locate_behind(back, float(w[-1]))
-            except ModelError:
-                continue
-            if self.settings.switch == "follow":
-                self._go_on(back.turned(), new)
-            else:
-                self.reason, self.is_stopped = f"{self.special[-1]!r}", True
-            return True
-        return False
+            if self._turns_to(new, -direction, value):
+                return True
+        # At a non-smooth fold the cycle without the leg is on this side, and ends at the same point.
+        shorter = without_short_leg(curve, w)
+        return shorter is not None and any(
+            self._turns_to(shorter, direction, value + reach * direction * ds * scale[-1])
+            for reach in (0.1, 1.0, 4.0)
+        )
+
+    def _turns_to(self, new: Cycle, direction: float, value: float) -> bool:
+        """Go on with a cycle, away from the point that it comes to on the way to a value of the parameter.
+
+        Parameters
+        ----------
+        new : Cycle
+        direction : float
+            In which direction the parameter leads to the point.
+        value : float
+            A value behind it.
+
+        Returns
+        -------
+        bool
+            False: no test function vanishes on the way.
+        """
+        try:
+            back = self._position(new, direction)
+            self._locate_behind(back, value)
+        except ModelError:
+            return False
+        if self.settings.switch == "follow":
+            self._go_on(back.turned(), new)
+        else:
+            self.reason, self.is_stopped = f"{self.special[-1]!r}", True
+        return True
 
     def _locate_behind(self, start: _Position, value: float) -> None:
         """Go back to a value of the parameter, and find the test function that vanishes first on the way.
@@ -551,6 +618,20 @@ class _Side:
         return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
 
 
+def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
+    """Return by how much the halves of a cycle differ, by its size; nothing if they are not alike."""
+    shooting = curve.shooting
+    n, m = shooting.n, shooting.m
+    itinerary = shooting.itinerary(w[: curve.n_unknowns])
+    if m % 2 or not itinerary.is_closed_by_event():
+        return None
+    first, second = itinerary.legs[: m // 2], itinerary.legs[m // 2 :]
+    if not all(a.is_alike(b) for a, b in zip(first, second, strict=True)):
+        return None
+    states = (w / curve.scales(w))[: m * n].reshape(2, -1)
+    return np.asarray(states[0] - states[1])
+
+
 def _is_same(one: State, other: State) -> bool:
     """Whether two states are the same, from wherever they start."""
     if isinstance(one, Cycle) and isinstance(other, Cycle):
@@ -574,77 +655,22 @@ def _at_parameter(curve: AnyCurve, w: Array, value: float, scale: Array) -> Step
 
 
 def _is_real(key: Any, state: State) -> bool:
-    """Whether a zero of a test function is what its code says: a critical pair is complex."""
-    if key[0] == "HB":
+    """Whether a zero of a test function is what its code says, and not a pole of it or noise."""
+    code = key[0]
+    if code == "HB":
         assert isinstance(state, Equilibrium)
         values = state.eigenvalues
         critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
         return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
-    if key[0] == "NS":
-        assert isinstance(state, Cycle)
-        values = state.nontrivial
+    if not isinstance(state, Cycle):
+        return True
+    values = state.nontrivial
+    if code == "NS":
         return bool(abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) > 1e-6)
+    if code in ("LP", "PD") and np.all(np.isfinite(values)):
+        critical = -1.0 if code == "PD" else 1.0
+        return bool(np.min(np.abs(values - critical), initial=np.inf) < _CRITICAL)
     return True
-
-
-def _flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
-    """Return the cycle of the flow near a point that need not be one, with the pieces of a run."""
-    shooting = curve.shooting
-    motions = shooting.motions.with_derivatives_by(())
-    motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
-    starts, durations, t = shooting.parts(w[: curve.n_unknowns])
-    longest = int(np.argmax(durations))
-    leg = shooting.legs[longest]
-    t += sum(durations[:longest])
-    half = 0.5 * durations[longest]
-    try:
-        x = motions.leg(leg.mode, leg.discrete, t, starts[longest], half).x
-        forcing = shooting.period
-        duration = sum(durations) if forcing is None else forcing.value(motions)
-        found = cycle_at(motions, t + half, x, duration, forcing)
-    except ModelError:
-        return None
-    is_near = abs(found.period - duration) < 0.3 * duration
-    return found if is_near and found.is_admissible else None
-
-
-def _without_leg(
-    curve: CycleCurve, end: int, located: Step, settings: _Settings
-) -> tuple[Cycle, float] | None:
-    """Return the cycle near a point that does not do what happens at the end of a leg, and where it leads to.
-
-    Two branches may meet at a point and both lie on one side of it, like those with and without an impact.
-    """
-    shooting = curve.shooting
-    itinerary = shooting.itinerary(located.w[: curve.n_unknowns])
-    following = (end + 1) % len(itinerary.legs)
-    if len(itinerary.legs) == 1:
-        legs, starts, durations = (
-            [itinerary.legs[0]._replace(ending=None)],
-            itinerary.starts,
-            itinerary.durations,
-        )
-    elif itinerary.legs[end].mode == itinerary.legs[following].mode and following > end:
-        kept = [k for k in range(len(itinerary.legs)) if k != end]
-        legs = [itinerary.legs[k] for k in kept]
-        starts = tuple(itinerary.starts[end if k == following else k] for k in kept)
-        both = itinerary.durations[end] + itinerary.durations[following]
-        durations = tuple(both if k == following else itinerary.durations[k] for k in kept)
-    else:
-        return None
-    shorter = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
-    motions = shooting.motions.with_derivatives_by(())
-    for direction in (1.0, -1.0):
-        value = located.w[-1] + direction * 1e-4 * settings.size
-        motions = motions.with_derivatives_by(())
-        motions.use({**motions.params, settings.name: value})
-        try:
-            cycle = cycle_of(motions, shorter, shooting.period)
-        except ModelError:
-            continue
-        if cycle.is_admissible:
-            return cycle, direction
-    return None
 
 
 def _other_branch(special: Special, name: str) -> State:

@@ -52,6 +52,10 @@ class Leg(NamedTuple):
     discrete: tuple[float, ...]
     ending: Ending | None
 
+    def is_alike(self, other: Leg) -> bool:
+        """Whether another leg has this mode and this ending."""
+        return _signature(self) == _signature(other)
+
 
 class Itinerary(NamedTuple):
     """The legs of a cycle, with a first guess of where they start and how long they last.

@@ -16,7 +16,7 @@ from filippov.cycles.motions import Array, Guard, Mode, Motions
 from filippov.cycles.shooting import Passage, Shooting, Shot
 from filippov.cycles.zero import zero_between
 
-__all__ = ["PLACES", "Probe", "local_probe", "probes_of"]
+__all__ = ["PLACES", "Probe", "end_probes_of", "local_probe", "probes_of"]
 
 PLACES = 6
 _NAMES = {
@@ -84,6 +84,13 @@ def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
             along = np.append(along[0], beyond), np.hstack([along[1], guards[:, 1:2]])
         found += _inside(shooting, i, leg, t, starts[i], along)
         t = passage.t
+    return found + end_probes_of(shooting, shot)
+
+
+def end_probes_of(shooting: Shooting, shot: Shot) -> list[Probe]:
+    """Return the test functions at the ends of the legs."""
+    found: list[Probe] = []
+    for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
         following = shooting.legs[(i + 1) % shooting.m]
         if leg.ending is not None and leg.ending.guard is not None:
             found += _at_end(shooting.motions, i, leg, following, passage)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from filippov.cycles.branch import Branch, Point, Special, State
-from filippov.cycles.cycle import Cycle
 from filippov.cycles.curves import OnCurve
+from filippov.cycles.cycle import Cycle
 from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg

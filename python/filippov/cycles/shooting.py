@@ -134,6 +134,16 @@ class Shooting:
         self._reference = itinerary.starts[0].copy()
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+        self.swing = self._swing(itinerary)
+
+    def _swing(self, itinerary: Itinerary) -> Array:
+        """Return how far each state moves in about a radian of the cycle, (n,), by its starts."""
+        t, velocities = itinerary.t0, []
+        for leg, x, duration in zip(itinerary.legs, itinerary.starts, itinerary.durations, strict=True):
+            velocities.append(np.abs(self.motions.at(leg.mode, leg.discrete, t, x).velocity))
+            t += duration
+        found = np.max(velocities, axis=0) * itinerary.period / (2 * np.pi)
+        return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
     def refer_to(self, u: Array) -> None:
         """Fix the phase of a cycle that starts at no event beside another one."""
@@ -263,7 +273,8 @@ class Shooting:
 def scales(shooting: Shooting, u: Array) -> Array:
     """Return the sizes by which the unknowns are measured."""
     starts, durations, _ = shooting.parts(u)
-    size = np.max(np.abs(starts), axis=0)
+    # A state that is small where the legs start is not small in between.
+    size = np.maximum(np.max(np.abs(starts), axis=0), shooting.swing)
     size = np.maximum(size, 1e-3 * max(float(np.max(size)), 1e-300))
     period = float(sum(durations))
     parts = [np.tile(size, shooting.m), np.full(shooting.m, period)]

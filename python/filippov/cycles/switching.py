@@ -12,15 +12,15 @@ import numpy as np
 from filippov.cycles.arclength import corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import Special, State
-from filippov.cycles.cycle import Cycle
+from filippov.cycles.cycle import Cycle, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.itinerary import itinerary_from_event
+from filippov.cycles.itinerary import Itinerary, itinerary_from_event
 from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium
 from filippov.cycles.shooting import Shooting
 from filippov.errors import InputError, ModelError
 
-__all__ = ["other_branch"]
+__all__ = ["other_branch", "single_at_doubling"]
 
 
 def other_branch(special: Special, name: str) -> State:
@@ -63,6 +63,54 @@ def _doubled(cycle: Cycle) -> Cycle:
     doubled = Shooting(motions, itinerary, period)
     u = doubled.unknowns(itinerary)
     return Cycle(doubled, u, doubled.shoot(u), 0.0)
+
+
+def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
+    """Return the cycle at the period doubling between two points of the branch of doubled ones.
+
+    Parameters
+    ----------
+    curve : CycleCurve
+        The branch, in one parameter.
+    one, other : ndarray
+        Points of it, on both sides of the place at which both halves are the same.
+
+    Raises
+    ------
+    ModelError
+        If it is not found.
+    """
+    shooting = curve.shooting
+    n, m = shooting.n, shooting.m
+    w = 0.5 * (one + other)
+    doubled = shooting.itinerary(w[: curve.n_unknowns])
+    states = np.array(doubled.starts).reshape(2, m // 2, n).mean(axis=0)
+    durations = np.array(doubled.durations).reshape(2, m // 2).mean(axis=0)
+    half = Itinerary(doubled.legs[: m // 2], doubled.t0, tuple(states), tuple(durations.tolist()))
+    motions = shooting.motions.with_derivatives_by(())
+    period = None if shooting.period is None else shooting.period.half()
+
+    def cycle_at(value: float) -> Cycle:
+        own = motions.copy()
+        own.use({**shooting.motions.params, curve.names[0]: value})
+        return cycle_of(own, half, period)
+
+    def value_at(value: float) -> float:
+        return float(np.prod(1.0 + cycle_at(value).multipliers).real)
+
+    # Secants: the parameter has an extremum on the branch of doubled cycles, and not on the single one.
+    a, b = float(w[-1]), float(w[-1]) + 1e-4 * float(curve.sizes[-1])
+    at_a, at_b = value_at(a), value_at(b)
+    for _ in range(30):
+        if at_a == at_b:
+            break
+        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
+        if abs(b - w[-1]) > 0.1 * curve.sizes[-1]:
+            raise ModelError("the period doubling is not near")
+        at_b = value_at(b)
+        if abs(b - a) < 1e-13 * float(curve.sizes[-1]):
+            break
+    return cycle_at(b)
 
 
 def _beside(curve: CycleCurve, code: str) -> State:
