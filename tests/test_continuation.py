@@ -521,3 +521,15 @@ def test_branches_turn_back_where_an_impact_begins() -> None:
     assert abs(branch.special["GR"][0].params["omega"] - grazing) < 1e-8
     assert abs(branch.special["LP"][0].params["omega"] - fold) < 1e-8
     assert bool(branch.admissible.all())
+
+
+def test_a_curve_ends_where_something_else_happens_on_it() -> None:
+    # Closed form: the slip lasts for 2 pi, from rest at y = F - 1 to rest at 1 - F, where sticking begins with a
+    # force at its bound. A multiplier is 1 there too, and the equations are singular.
+    branch = fl.continuation(fl.limit_cycle(friction(omega=0.22), [1.0, 2.0]), "omega", (0.2, 0.25))
+    curve = fl.continuation(branch.special["AS"][0], ("F", "omega"), {"F": (0.01, 0.41), "omega": (0.1, 0.4)})
+    (end,) = curve.special["SS"]
+    force, omega = end.params["F"], end.params["omega"]
+    assert abs((1 - force) * (1 - omega**2) - (1 - 2 * force)) < 1e-7
+    assert abs(np.sin(np.pi * omega) - (1 - 2 * force)) < 1e-7
+    assert "switching-sliding, on a curve of AS" in curve.reason

@@ -222,7 +222,7 @@ class _CurveSide:
         direction: float,
     ) -> None:
         self.names, self.ranges, self.sizes, self.code = names, ranges, sizes, start.code
-        self.special_start = start
+        self.own = start.test
         curve, w = curve_of(start.state, names, sizes)
         self.extended = _extended(curve, start, w)
         scale = curve.scales(w)
@@ -237,7 +237,7 @@ class _CurveSide:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason = ""
-        self.trail: list[tuple[Array, float]] = []
+        self.trail: list[tuple[Array, dict[Any, float]]] = []
         # Symmetric cycles meet their condition in several places.
         alike = self._tests(self.w, ())
         self.together = {key for key, value in alike.items() if abs(value) < 1e-7}
@@ -253,17 +253,16 @@ class _CurveSide:
             found.update({p.key: p.value for p in probes})
         if self.code != "GR":  # at an impact without speed the multipliers are infinite
             found.update(singular_values_of(curve, w))
-        own = self.special_start.test
         return {
             key: value
             for key, value in found.items()
-            if key != own and key not in without and np.isfinite(value)
+            if key != self.own and key not in without and np.isfinite(value)
         }
 
     def _keep(self, point: Step) -> None:
         self.extended.condition.keep(self.w)
         self.tests = self._tests(self.w)
-        self.trail.append((self.w, self.tests.get(("degenerate",), np.nan)))
+        self.trail.append((self.w, self.tests))
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
         state = self.extended.curve.state(self.w, point.error)
         self.points.append(Point(params, state, self.tests))
@@ -294,27 +293,37 @@ class _CurveSide:
         self.reason = f"{most} points"
 
     def _ends_nearby(self) -> bool:
-        """Whether the condition is degenerate just behind, where the equations are singular too."""
-        key = ("degenerate",)
-        # Of points that are too near the difference is noise.
-        latest: list[tuple[Array, float]] = []
-        for w, value in reversed(self.trail):
-            is_far = abs(value) > 3e-3 * abs(self.trail[0][1])
-            if is_far and (not latest or abs(value) > 1.6 * abs(latest[-1][1])):
-                latest.append((w, value))
-        latest = latest[:4]
-        values = [value for _, value in latest]
-        if len(values) < 4 or min(values) * max(values) < 0 or abs(values[0]) > 0.5 * abs(self.trail[0][1]):
+        """Whether more vanishes just ahead, where the equations are singular too."""
+        near = self._vanishing_ahead()
+        if not near:
             return False
-        # Inverse interpolation: the point as a function of the next derivative, at 0.
-        weights = [np.prod([b / (b - a) for b in values if b != a]) for a in values]
-        w = sum(weight * point for weight, (point, _) in zip(weights, latest, strict=True))
+        (_, key, w), others = near[0], near[1:]
+        also = {CODES[other[0]] for _, other, _ in others if other[0] in CODES and other[0] != key[0]}
+        kind = " and ".join([_kind(key, self.code), *sorted(also)])
+        code = "CP" if key == ("degenerate",) else key[0]
         params = dict(zip(self.names, map(float, w[-2:]), strict=True))
-        kind = f"{CODES['CP']} of {self.code}"
         state = self.points[-1].state
-        self.special.append(Special("CP", kind, "", np.nan, params, len(self.points) - 1, state, key))
+        self.special.append(Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key))
         self.reason = f"the flow follows the curve no further than {self._where(w)}: {kind}"
         return True
+
+    def _vanishing_ahead(self) -> list[tuple[float, Any, Array]]:
+        """Return what vanishes just ahead, the nearest first: how far, the test function, and the point."""
+        scale = self.extended.scales(self.w)
+        found = []
+        for key in self.tests:
+            if key[0] not in (*_PROBES, "degenerate", "LP", "PD"):
+                continue
+            trail = [(w, tests[key]) for w, tests in self.trail if key in tests]
+            w = _zero_ahead(trail)
+            if w is not None and (w - self.w) / scale @ self.tangent > 0:
+                found.append((float(np.linalg.norm((w - self.w) / scale)), key, w))
+        # What changes the itinerary or ends the curve first; multipliers are what is lost together with it.
+        found.sort(key=lambda one: (one[1][0] in ("LP", "PD"), one[0]))
+        if not found or found[0][1][0] in ("LP", "PD") or found[0][0] > _LONGEST_STEP:
+            return []
+        first = found[0][2]
+        return [one for one in found if np.linalg.norm((one[2] - first) / scale) < 1e-3]
 
     def _step(self, ds: float) -> tuple[Step, Array]:
         scale = self.extended.scales(self.w)
@@ -339,12 +348,7 @@ class _CurveSide:
         found = sorted((self._located(key, point, tests) for key in lost), key=lambda located: located[0])
         for _, key, there in found:
             is_degenerate = key[0] == "degenerate"
-            code = "CP" if is_degenerate else key[0]
-            kind = (
-                f"{CODES[code]} of {self.code}"
-                if is_degenerate
-                else f"{CODES[code]}, on a curve of {self.code}"
-            )
+            code, kind = "CP" if is_degenerate else key[0], _kind(key, self.code)
             params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
             state = self.extended.curve.state(there.w, there.error)
             special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
@@ -352,9 +356,9 @@ class _CurveSide:
                 continue
             self.special.append(special)
             if is_degenerate or code in _PROBES:
+                self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 self.w = there.w
                 self._keep(there)
-                self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 return False
         return True
 
@@ -382,6 +386,30 @@ class _CurveSide:
 
     def _where(self, w: Array) -> str:
         return ", ".join(f"{name} = {value:.10g}" for name, value in zip(self.names, w[-2:], strict=True))
+
+
+def _kind(key: Any, code: str) -> str:
+    """Return what a test function that vanishes on a curve means, in words."""
+    if key == ("degenerate",):
+        return f"{CODES['CP']} of {code}"
+    return f"{CODES[key[0]]}, on a curve of {code}"
+
+
+def _zero_ahead(trail: list[tuple[Array, float]]) -> Array | None:
+    """Return where a quantity along a curve vanishes behind its last point, by inverse interpolation."""
+    first = abs(trail[0][1])
+    # Of points that are too near the difference is noise.
+    latest: list[tuple[Array, float]] = []
+    for w, value in reversed(trail):
+        is_far = abs(value) > 3e-3 * first
+        if is_far and (not latest or abs(value) > 1.6 * abs(latest[-1][1])):
+            latest.append((w, value))
+    latest = latest[:4]
+    values = [value for _, value in latest]
+    if len(values) < 4 or min(values) * max(values) < 0 or abs(values[0]) > 0.5 * first:
+        return None
+    weights = [np.prod([b / (b - a) for b in values if b != a]) for a in values]
+    return np.asarray(sum(weight * point for weight, (point, _) in zip(weights, latest, strict=True)))
 
 
 def _is_unit(code: str, state: Any) -> bool:

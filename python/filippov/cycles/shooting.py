@@ -26,6 +26,7 @@ _MOST_STEPS = 30
 # A step of so many sizes of a cycle is one of equations that are singular but for rounding; so is a much
 # shorter one where the equations hold to rounding.
 _ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
+_SOLVED = 1e-11
 # A cycle whose velocities fall to such a share is an equilibrium.
 _SHRUNK = 1e-6
 
@@ -309,7 +310,9 @@ def solve(
         u = u + min(_shorter(shooting, u, change), 1.0 / max(size, 1e-300)) * change
         if not 0.02 * first < sum(shooting.parts(u)[1]) < 50 * first:
             break
-        if size < tol or (size < 1e-9 and size >= 0.5 * best):
+        # Steps that do not become shorter are rounding, of equations that are nearly singular the more.
+        is_solved = np.all(np.abs(shot.residual) < _SOLVED * (np.abs(jacobian) @ scale))
+        if size < tol or (size >= 0.5 * best and (size < 1e-9 or (is_solved and size < 1e-7))):
             if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
                 break
             found = shooting.shoot(u)
