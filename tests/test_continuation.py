@@ -283,7 +283,7 @@ def test_other_branches_begin_at_boundary_equilibria() -> None:
     other = fl.continuation(boundary, "alpha", (0.25, 0.6))
     assert other.points[0].state.codimension == 1
     assert codes(other)[:1] == ["PSN"]
-    with pytest.raises(fl.InputError, match="other branches begin at PD, BP and BE, not at EP"):
+    with pytest.raises(fl.InputError, match="other branches begin at PD, BP, BE and HB, not at EP"):
         fl.continuation(branch.special["EP"][0], "alpha", (0.25, 0.6))
 
 
@@ -524,8 +524,8 @@ def test_branches_turn_back_where_an_impact_begins() -> None:
 
 
 def test_a_curve_ends_where_something_else_happens_on_it() -> None:
-    # Closed form: the slip lasts for 2 pi, from rest at y = F - 1 to rest at 1 - F, where sticking begins with a
-    # force at its bound. A multiplier is 1 there too, and the equations are singular.
+    # Closed form: the slip lasts for 2 pi, from rest at y = F - 1 to rest at 1 - F, where sticking begins
+    # with a force at its bound. A multiplier is 1 there too, and the equations are singular.
     branch = fl.continuation(fl.limit_cycle(friction(omega=0.22), [1.0, 2.0]), "omega", (0.2, 0.25))
     curve = fl.continuation(branch.special["AS"][0], ("F", "omega"), {"F": (0.01, 0.41), "omega": (0.1, 0.4)})
     (end,) = curve.special["SS"]
@@ -533,3 +533,55 @@ def test_a_curve_ends_where_something_else_happens_on_it() -> None:
     assert abs((1 - force) * (1 - omega**2) - (1 - 2 * force)) < 1e-7
     assert abs(np.sin(np.pi * omega) - (1 - 2 * force)) < 1e-7
     assert "switching-sliding, on a curve of AS" in curve.reason
+
+
+def around(t: float, z: Any, mu: float = -0.5, a: float = 1.0) -> list[Any]:
+    """Return the normal form of a Hopf bifurcation, in the plane w = x / 10 that is slid on."""
+    x, y, w = z
+    grow = mu - a * (x**2 + y**2)
+    f, g = x * grow - 2 * y, y * grow + 2 * x
+    return [f, g, 0.1 * f - np.sign(w - 0.1 * x)]
+
+
+@pytest.mark.parametrize("a", [1.0, -1.0], ids=["supercritical", "subcritical"])
+def test_cycles_begin_at_a_hopf_point_of_the_sliding_motion(a: float) -> None:
+    rest = fl.equilibrium(fl.System(around, n=3, params={"mu": -0.5, "a": a}), np.zeros(3), mode="0")
+    rests = fl.continuation(rest, "mu", (-1.0, 1.0))
+    (hopf,) = rests.special["HB"]
+    assert abs(hopf.params["mu"]) < 1e-10
+    cycles = fl.continuation(hopf, "mu", (-1.0, 1.0))
+    assert cycles.reasons == {
+        "below": f"it starts at {hopf!r}",
+        "above": f"mu = {a:g} is the end of the range",
+    }
+    for point in cycles.points:
+        cycle, mu = point.state, point.params["mu"]
+        assert abs(np.sum(cycle.y0[:2] ** 2) - mu / a) < 1e-10
+        assert abs(cycle.y0[2] - 0.1 * cycle.y0[0]) < 1e-12
+        assert abs(cycle.period - np.pi) < 1e-10
+        # The radius r has r' = r (mu - a r^2), of which -2 mu is the slope.
+        found = np.sort(np.abs(cycle.multipliers))
+        np.testing.assert_allclose(found, np.sort([0.0, 1.0, np.exp(-2 * np.pi * mu)]), rtol=1e-8)
+        assert cycle.n_zero == 1
+        assert cycle.is_stable == (a > 0)
+
+
+def test_cycles_begin_at_a_hopf_point_of_a_region() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    (hopf,) = fl.continuation(start, "d", (0.3, 0.6)).special["HB"]
+    cycles = fl.continuation(hopf, "d", (0.3, 0.6))
+    # The predators stay below the threshold, until the cycle grazes it; then it slides.
+    (grazing,) = cycles.special["GS"]
+    highest = np.max(grazing.state.solution.sol(np.linspace(0, grazing.state.period, 20001))[1])
+    assert abs(highest - 0.45) < 1e-7
+    d = 0.45
+    run = fl.limit_cycle(harvest("harvest_equilibria", alpha="0.45"), [0.3, 0.3], {"d": d})
+    assert abs(cycles.at(d=d).period - run.period) < 1e-9
+
+
+def test_a_cycle_that_slides_for_ever() -> None:
+    cycle = fl.limit_cycle(fl.System(around, n=3), [0.3, 0.2, 0.5], {"mu": 0.4})
+    assert [str(mode) for mode in cycle.modes] == ["0"]
+    assert abs(cycle.period - np.pi) < 1e-10
+    assert cycle.n_zero == 1
+    assert abs(np.hypot(*cycle.y0[:2]) - np.sqrt(0.4)) < 1e-10

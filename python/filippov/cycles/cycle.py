@@ -676,13 +676,20 @@ def _first_event(run: Solution) -> tuple[Array, Array]:
 
 
 def _last_inside(run: Solution) -> tuple[float, Array]:
-    """Return the last place of a run in the middle of a piece that slides on no surface; or else its end."""
+    """Return the last place of a run in the middle of a piece that slides on few surfaces."""
     assert run.sol is not None
-    for segment in run.segments[::-1][:_MOST_RETURNS]:
-        if segment.mode.codimension == 0 and segment.t_end > segment.t_start:
-            t = 0.5 * (segment.t_start + segment.t_end)
-            return t, run.sol(t)
-    return float(run.t[-1]), run.y[:, -1]
+    t_end, span = float(run.t[-1]), float(run.t[-1] - run.t[0])
+    pieces = [
+        piece
+        for piece in run.segments[::-1][:_MOST_RETURNS]
+        if piece.t_end > max(piece.t_start, t_end - 0.5 * span)
+    ]
+    if not pieces:
+        return t_end, run.y[:, -1]
+    # Where none is free of sliding, a cycle may slide for ever.
+    last = min(pieces, key=lambda piece: piece.mode.codimension)
+    t = 0.5 * (max(last.t_start, t_end - 0.5 * span) + last.t_end)
+    return t, run.sol(t)
 
 
 def _attracts(cycle: Cycle) -> bool:

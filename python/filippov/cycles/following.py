@@ -82,7 +82,7 @@ def continuation(
     ----------
     start : Cycle, Equilibrium or Special
         With one parameter a special point is where the other branch through it starts: cycles of twice the
-        period at PD, the other equilibria at BE. With two parameters it is a point of the curve.
+        period at PD, the other equilibria at BE, cycles at HB. With two parameters the curve goes through it.
     parameter : str, or pair of str
         What varies.
     bounds : (float, float), or dict
