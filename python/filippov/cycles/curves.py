@@ -339,7 +339,7 @@ class _CurveSide:
                 point = corrected(self.extended, guess, scale, unit)
                 point.w[place] = bound
         tangent = tangent_of(point.jacobian, self.extended.scales(point.w), self.tangent)
-        if tangent @ self.tangent < 0.7 and ds > 1e-5:
+        if tangent @ self.tangent < 0.9 and ds > 1e-5:
             raise ModelError("the curve turns too far in one step")
         return point, tangent
 
