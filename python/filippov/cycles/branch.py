@@ -30,6 +30,8 @@ CODES = {
     "SS": "switching-sliding",
     "AS": "adding-sliding",
     "GR": "grazing of a reset",
+    "CO": "corner: two boundaries at once",
+    "TF": "two-fold",
     "CP": "degenerate point",
     "UZ": "a monitor vanishes",
     "EP": "end",
@@ -37,7 +39,7 @@ CODES = {
 
 
 # At these the flow takes another itinerary.
-CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
+CHANGES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF", "BE")
 
 
 class Point(NamedTuple):
@@ -61,7 +63,7 @@ class Point(NamedTuple):
         """Whether the flow follows the itinerary there: all its test functions are positive."""
         if isinstance(self.state, Equilibrium):
             return self.state.is_admissible
-        return all(value > 0 for key, value in self.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))
+        return all(value > 0 for key, value in self.tests.items() if key[0] in CHANGES)
 
 
 class Special(NamedTuple):

@@ -27,7 +27,7 @@ from filippov.unknown import did_you_mean
 __all__ = ["OnCurve", "curve_in_two"]
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.04, 1e-6
-_PROBES = ("CS", "SS", "GS", "AS", "GR")
+_PROBES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF")
 
 
 class _Condition(Protocol):

@@ -34,7 +34,8 @@ AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _WIDTH = 1e-13
-_SAME_HALVES = 1e-9
+_SAME_HALVES, _NOISE = 1e-9, 1e-10
+_NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
 _SAVED_EVERY = 50
@@ -412,7 +413,12 @@ class _Side:
         before, after = self.here.tests, following.tests
         wanted = {*CHANGES, *self.settings.detect}
         common = [key for key in after if key in before and key[0] in wanted]
-        changed = [key for key in common if after[key] * before[key] < 0]
+        # What vanishes along a whole branch has no sign.
+        changed = [
+            key
+            for key in common
+            if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > _NOISE
+        ]
         found = sorted((self._located(self.here, key, following) for key in changed), key=lambda at: at[0])
         curve = self.here.curve
         for _, key, located in found:
@@ -482,7 +488,8 @@ class _Side:
             zero_between(value, (0.0, tests[key]), (length, end.tests[key]), _WIDTH)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
-            if key[0] in CHANGES or not nearest:
+            is_near = nearest and nearest[0][0] < 1e-6 * max(abs(tests[key]), abs(end.tests[key]))
+            if not nearest or (key[0] in CHANGES and not is_near):
                 raise
         _, s, point = nearest[0]
         return s, key, point
@@ -547,7 +554,7 @@ class _Side:
             new = flow_near(curve, w + reach * ds * tangent * scale)
             if new is None or new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
                 continue
-            if self._turns_to(new, -direction, value):
+            if self._turns_to(new, -direction, value) or self._passes_to(new, direction, ds):
                 return True
         # At a non-smooth fold the cycle without the leg is on this side, and ends at the same point.
         shorter = without_short_leg(curve, w)
@@ -555,6 +562,36 @@ class _Side:
             self._turns_to(shorter, direction, value + reach * direction * ds * scale[-1])
             for reach in (0.1, 1.0, 4.0)
         )
+
+    def _passes_to(self, new: Cycle, direction: float, ds: float) -> bool:
+        """Go on with a cycle behind the point at which a leg of this one has no duration, as at a corner."""
+        curve, w, tangent, _ = self.here
+        assert isinstance(curve, CycleCurve)
+        scale, first, m = curve.scales(w), curve.shooting.m * curve.shooting.n, curve.shooting.m
+        period = float(np.sum(w[first : first + m]))
+        ahead = (w + 4.0 * ds * tangent * scale)[first : first + m]
+        for k in np.flatnonzero(ahead <= 0):
+            there = w + w[first + k] / (w[first + k] - ahead[k]) * 4.0 * ds * tangent * scale
+            there[first + k] = _NO_DURATION * period
+            unit = np.zeros(len(w))
+            unit[first + k] = 1.0
+            try:
+                step = corrected(curve, there, scale, unit)
+                following = self._position(new, direction)
+                values = {p.key: p.value for p in curve.probes(step.w)}
+            except ModelError:
+                continue
+            key = min(values, key=lambda key: abs(values[key]), default=None)
+            is_between = (step.w[-1] - w[-1]) * (following.w[-1] - step.w[-1]) >= 0
+            if key is None or abs(values[key]) > _VANISHES or not is_between:
+                continue
+            self._add(key[0], key, curve, curve.state(step.w, step.error))
+            if self.settings.switch == "follow":
+                self._go_on(following, new)
+            else:
+                self.reason, self.is_stopped = f"{self.special[-1]!r}", True
+            return True
+        return False
 
     def _turns_to(self, new: Cycle, direction: float, value: float) -> bool:
         """Go on with a cycle, away from the point that it comes to on the way to a value of the parameter.

@@ -10,6 +10,7 @@ Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -135,16 +136,17 @@ class Shooting:
         self._reference = itinerary.starts[0].copy()
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
-        self.swing = self._swing(itinerary)
+        self._guess = itinerary
 
-    def _swing(self, itinerary: Itinerary) -> Array:
-        """Return how far each state moves in about a radian of the cycle, (n,), by its starts."""
-        t, velocities = itinerary.t0, []
-        for leg, x, duration in zip(itinerary.legs, itinerary.starts, itinerary.durations, strict=True):
-            velocities.append(np.abs(self.motions.at(leg.mode, leg.discrete, t, x).velocity))
+    @cached_property
+    def swing(self) -> Array:
+        """How far the states are from the starts of their legs on the way, (n,), in the first guess."""
+        t, found = self._guess.t0, np.zeros(self.n)
+        for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
+            middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration).x
+            found = np.maximum(found, np.abs(middle - x))
             t += duration
-        found = np.max(velocities, axis=0) * itinerary.period / (2 * np.pi)
-        return np.asarray(np.where(np.isfinite(found), found, 0.0))
+        return np.where(np.isfinite(found), found, 0.0)
 
     def refer_to(self, u: Array) -> None:
         """Fix the phase of a cycle that starts at no event beside another one."""
