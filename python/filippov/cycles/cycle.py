@@ -581,6 +581,7 @@ def _repeated_forced(
     single = forcing.value(motions)
     if transient == 0:
         return cycle_at(motions, t0, x, single, forcing)
+    problem = ""
     for attempt in range(4):
         count = transient * 4**attempt
         phases = t0 + single * (count + (np.arange(_PHASES) + 0.381966) / _PHASES)
@@ -606,12 +607,12 @@ def _repeated_forced(
                     found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
                 if _attracts(found):
                     return found
-            except ModelError:
-                if attempt == 3:
-                    raise
+                problem = "; the cycle near it is unstable"
+            except ModelError as error:
+                problem = f"; near it {str(error)[0].lower()}{str(error)[1:]}"
     raise ModelError(
         f"no cycle was found: after {count} periods of the forcing the run does not repeat itself within "
-        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be "
+        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size{problem}). It may be "
         "chaotic, quasiperiodic or grow; more of it is simulated with transient="
     )
 

@@ -35,6 +35,8 @@ AnyCurve = CycleCurve | EquilibriumCurve
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _WIDTH = 1e-13
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
+# A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
+_UNBOUNDED, _RECENT, _STANDS = 1e4, 8, 1e-8
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
@@ -335,7 +337,7 @@ class _Side:
                     self.reason = self._why_it_ended(error)
                     return
                 continue
-            if not goes_on or self._closes() or self._vanishes():
+            if not goes_on or self._closes() or self._vanishes() or self._grows():
                 return
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
         self.reason = f"{self.settings.most} points"
@@ -381,6 +383,30 @@ class _Side:
         ]
         self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
         return True
+
+    def _grows(self) -> bool:
+        """Whether the cycle, or its period, grows without bound: the parameter comes to a limit."""
+        first, last = self.points[0].state, self.points[-1].state
+        if not isinstance(first, Cycle) or not isinstance(last, Cycle):
+            return False
+        name, value = self.settings.name, float(self.here.w[-1])
+        ratio = _size_of(last) / _size_of(first)
+        if ratio > _UNBOUNDED:
+            self.reason = f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
+            return True
+        recent = self.points[-_RECENT:]
+        if len(recent) < _RECENT or last.is_forced:
+            return False
+        values, earlier = [point.params[name] for point in recent], recent[0].state
+        assert isinstance(earlier, Cycle)
+        stands = np.ptp(values) < _STANDS * self.settings.size
+        if stands and last.period > 1.3 * earlier.period:
+            self.reason = (
+                f"the period grows without bound near {name} = {value:.9g}, to {last.period:.3g}: the cycle comes "
+                "to an orbit that begins and ends at an equilibrium"
+            )
+            return True
+        return False
 
     def _is_at_end(self) -> bool:
         """Whether the range ends here, and the branch does not lead into it."""
@@ -644,15 +670,11 @@ class _Side:
 
     def _why_it_ended(self, error: ModelError) -> str:
         name, value = self.settings.name, float(self.here.w[-1])
-        first, last = self.points[0].state, self.points[-1].state
-        grows = ""
-        if isinstance(last, Cycle) and isinstance(first, Cycle):
-            sizes = [float(np.max(np.abs(np.array(c.itinerary.starts)))) for c in (first, last)]
-            if sizes[1] > 1e3 * sizes[0]:
-                grows = f"; the cycle grows without bound, to {sizes[1]:.3g}"
-            elif last.period > 1e3 * first.period:
-                grows = f"; the period grows without bound, to {last.period:.3g}"
-        return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
+        return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
+
+
+def _size_of(cycle: Cycle) -> float:
+    return float(np.max(np.abs(np.array(cycle.itinerary.starts))))
 
 
 def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
