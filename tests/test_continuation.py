@@ -686,3 +686,30 @@ def test_two_folds_at_the_end_of_sliding() -> None:
             legs = point.state.itinerary.legs
             end = next(leg.ending.time for leg in legs if leg.mode == (0,) and leg.ending)
             assert abs(np.sin(end) - 0.5 - min(0.0, point.params["mu"] / 2)) < 1e-9
+
+
+@pytest.mark.parametrize("eps", [0.3, -0.3], ids=["unstable saddle side", "reversed"])
+def test_a_branch_ends_at_a_homoclinic_orbit(eps: float) -> None:
+    # The cycles are the curves H = mu of an energy H, from the bottom of a well to the separatrix at H = 0.
+    def well(t: float, z: Any, mu: float = -0.3, eps: float = 0.3) -> list[Any]:
+        x, y = z
+        return [y, x - x**3 + eps * y * (mu - (y**2 / 2 - x**2 / 2 + x**4 / 4))]
+
+    system = fl.System(well, n=2, params={"mu": -0.3, "eps": eps})
+    rests = fl.continuation(fl.equilibrium(system, [0.9, 0.0]), "mu", (-0.5, 0.2))
+    (hopf,) = rests.special["HB"]
+    assert abs(hopf.params["mu"] + 0.25) < 1e-10
+    branch = fl.continuation(hopf, "mu", (-0.5, 0.2))
+    assert "the period grows without bound" in branch.reasons["above"]
+    assert abs(branch.values("mu")[-1]) < 1e-8
+    assert branch.values("period")[-1] > 20
+    assert codes(branch) == []
+    for point in branch.points:
+        x, y = point.state.y0
+        assert abs(y**2 / 2 - x**2 / 2 + x**4 / 4 - point.params["mu"]) < 1e-8
+    far = branch.at(mu=-1e-4)
+    assert len(far.itinerary.legs) == 1
+    # One multiplier is 1, and both have the product of the mean divergence, here of mu - H - y^2.
+    assert far.trivial_error < 1e-6
+    assert far.is_stable == (eps > 0)
+    assert far.is_admissible

@@ -291,3 +291,27 @@ def test_an_equilibrium_is_no_cycle() -> None:
     center = fl.System(lambda t, x: [x[1], -x[0]], n=2)
     with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
         fl.limit_cycle(center, [1.0, 0.3], period=6.0, transient=0)
+
+
+def test_cycles_along_which_perturbations_grow_very_much() -> None:
+    # Backwards in time the cycle of van der Pol is unstable; that of the other direction is the guess.
+    def ahead(t: float, x: Any, mu: float = 1.0, sense: float = 1.0) -> list[Any]:
+        return [sense * x[1], sense * (mu * (1 - x[0] ** 2) * x[1] - x[0])]
+
+    system = fl.System(ahead, n=2)
+    stable = fl.limit_cycle(system, [1.0, 0.0])
+    assert abs(stable.period - 6.663286859323) < 1e-9
+    start = fl.limit_cycle(system, stable.y0, {"sense": -1.0}, period=stable.period, transient=0)
+    assert abs(start.period - stable.period) < 1e-9
+    assert abs(float(np.max(start.multipliers.real)) * float(stable.nontrivial[0].real) - 1) < 1e-6
+    branch = fl.continuation(start, "mu", (0.9, 4.0))
+    assert branch.reasons["above"] == "mu = 4 is the end of the range"
+    for mu in (2.0, 3.0, 4.0):
+        there, forwards = branch.at(mu=mu), fl.limit_cycle(system, [1.0, 0.0], {"mu": mu})
+        assert abs(there.period - forwards.period) < 1e-9
+        assert len(there.modes) == 1
+        assert not there.is_stable
+        assert there.is_admissible
+        # Along them perturbations grow by more than 1e18 at mu = 4.
+        growth = np.log(float(np.max(np.abs(there.multipliers))))
+        assert growth > 10 * mu - 4

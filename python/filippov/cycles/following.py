@@ -15,7 +15,7 @@ import numpy as np
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
-from filippov.cycles.cycle import Cycle, cycle_of
+from filippov.cycles.cycle import Cycle, cycle_of, in_parts
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
 from filippov.cycles.monitors import Monitor, monitors_of
@@ -36,7 +36,7 @@ _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _WIDTH = 1e-13
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
-_UNBOUNDED, _RECENT, _STANDS = 1e4, 8, 1e-8
+_UNBOUNDED, _STANDS = 1e4, 1e-8
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
@@ -244,7 +244,7 @@ def at_value(state: State, name: str, value: float) -> State:
     if isinstance(state, Cycle):
         motions = state._shooting.motions.with_derivatives_by(())
         motions.use({**state.params, name: value})
-        return cycle_of(motions, state.itinerary, state._shooting.period)
+        return cycle_of(motions, state._parts, state._shooting.period)
     motions = state._curve.motions.with_derivatives_by(())
     motions.use({**state.params, name: value})
     curve = EquilibriumCurve(motions, state._curve.mode)
@@ -390,22 +390,25 @@ class _Side:
         if not isinstance(first, Cycle) or not isinstance(last, Cycle):
             return False
         name, value = self.settings.name, float(self.here.w[-1])
-        ratio = _size_of(last) / _size_of(first)
-        if ratio > _UNBOUNDED:
+        starts = (np.max(np.abs(np.array(cycle.itinerary.starts))) for cycle in (first, last))
+        grown = next(starts) * _UNBOUNDED < next(starts)
+        if grown and _size_of(last) > _UNBOUNDED * _size_of(first):
             self.reason = f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
             return True
-        recent = self.points[-_RECENT:]
-        if len(recent) < _RECENT or last.is_forced:
+        if last.is_forced:
             return False
-        values, earlier = [point.params[name] for point in recent], recent[0].state
-        assert isinstance(earlier, Cycle)
-        stands = np.ptp(values) < _STANDS * self.settings.size
-        if stands and last.period > 1.3 * earlier.period:
-            self.reason = (
-                f"the period grows without bound near {name} = {value:.9g}, to {last.period:.3g}: the cycle comes "
-                "to an orbit that begins and ends at an equilibrium"
-            )
-            return True
+        values = []
+        for point in self.points[::-1]:
+            values.append(point.params[name])
+            assert isinstance(point.state, Cycle)
+            if np.ptp(values) > _STANDS * self.settings.size:
+                return False
+            if last.period > 1.3 * point.state.period:
+                self.reason = (
+                    f"the period grows without bound near {name} = {value:.9g}, to {last.period:.3g}: the "
+                    "cycle comes to an orbit that begins and ends at an equilibrium"
+                )
+                return True
         return False
 
     def _is_at_end(self) -> bool:
@@ -461,8 +464,17 @@ class _Side:
                 self._add(key[0], key, curve, state)
         state = curve.state(step.w, step.error)
         curve.refer_to(step.w)
+        finer = in_parts(state) if isinstance(state, Cycle) else None
+        if finer is not None:
+            following, state = self._finer(following, finer), finer
         self._go_on(following, state)
         return True
+
+    def _finer(self, position: _Position, cycle: Cycle) -> _Position:
+        """Return the position of a cycle in more parts, with the direction of one in fewer."""
+        finer = self._position(cycle, 1.0)
+        ways = [_summary(place.curve, place.w, place.tangent) for place in (position, finer)]
+        return finer if ways[0] @ ways[1] > 0 else finer.turned()
 
     def _is_single_again(self, following: _Position) -> bool:
         """Whether a cycle of two alike halves has become one that is followed twice: behind it they swap."""
@@ -673,8 +685,16 @@ class _Side:
         return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
 
 
+def _summary(curve: AnyCurve, w: Array, tangent: Array) -> Array:
+    """Return what a direction does to the first state, the period and the parameter of a cycle."""
+    assert isinstance(curve, CycleCurve)
+    n, m = curve.shooting.n, curve.shooting.m
+    return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])
+
+
 def _size_of(cycle: Cycle) -> float:
-    return float(np.max(np.abs(np.array(cycle.itinerary.starts))))
+    starts = float(np.max(np.abs(np.array(cycle.itinerary.starts))))
+    return max(starts, float(np.max(cycle._shooting.swing)))
 
 
 def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:

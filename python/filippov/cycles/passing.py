@@ -89,30 +89,43 @@ def flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
 
 def _middle(curve: CycleCurve, w: Array) -> tuple[float, Array]:
     """Return a time and the state in the middle of the longest leg."""
+    return max(_middles(curve, w), key=lambda row: row[0])[1:]
+
+
+def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
+    """Return how long each leg lasts, the time of its middle, and the state there."""
     shooting = curve.shooting
     motions = shooting.motions.with_derivatives_by(())
     motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
     starts, durations, t = shooting.parts(w[: curve.n_unknowns])
-    longest = int(np.argmax(durations))
-    leg = shooting.legs[longest]
-    t += sum(durations[:longest])
-    half = 0.5 * durations[longest]
-    return t + half, motions.leg(leg.mode, leg.discrete, t, starts[longest], half).x
+    found = []
+    for leg, start, duration in zip(shooting.legs, starts, durations, strict=True):
+        half = 0.5 * duration
+        found.append((duration, t + half, motions.leg(leg.mode, leg.discrete, t, start, half).x))
+        t += duration
+    return found
 
 
 def _distance(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
-    """Return how far a cycle is from a point of a curve, relative to the size of the states."""
-    t, x = _middle(curve, w)
-    times = cycle.t0 + cycle.period * np.arange(_PLACES) / _PLACES
-    points = np.array([cycle.at(time) for time in times])
+    """Return how far a cycle is from a point of a curve, in the middles of its legs and by its size."""
+    points = np.array([cycle.at(cycle.t0 + cycle.period * k / _PLACES) for k in range(_PLACES)])
     size = np.ptp(points, axis=0) + 1e-300
-    if cycle.is_forced:
-        return float(np.max(np.abs(cycle.at(t) - x) / size))
-    k = int(np.argmin(np.max(np.abs(points - x) / size, axis=1)))
-    # The distance from the nearest chord: the points are not dense.
-    chord = (points[(k + 1) % _PLACES] - points[k - 1]) / size
-    off = (points[k] - x) / size
-    return float(np.max(np.abs(off - chord * (chord @ off) / max(float(chord @ chord), 1e-300))))
+    middles = _middles(curve, w)
+    period = sum(duration for duration, _, _ in middles)
+    found = 0.0
+    for duration, t, x in middles:
+        if duration < SHORT * period:
+            continue
+        off = (points - x) / size
+        if cycle.is_forced:
+            found = max(found, float(np.max(np.abs(cycle.at(t) - x) / size)))
+            continue
+        k = int(np.argmin(np.max(np.abs(off), axis=1)))
+        # The distance from the nearest chord: the points are not dense.
+        chord = (points[(k + 1) % _PLACES] - points[k - 1]) / size
+        across = off[k] - chord * (chord @ off[k]) / max(float(chord @ chord), 1e-300)
+        found = max(found, float(np.max(np.abs(across))))
+    return found
 
 
 def back_from_change(curve: CycleCurve, key: Any, located: Step) -> tuple[Cycle, float] | None:
@@ -149,7 +162,7 @@ def _from_event(cycle: Cycle) -> Cycle:
 def without_short_leg(curve: CycleCurve, w: Array) -> Cycle | None:
     """Return the cycle without its shortest leg at a point of a branch, if that leg is short."""
     shooting = curve.shooting
-    itinerary = shooting.itinerary(w[: curve.n_unknowns])
+    itinerary = shooting.itinerary(w[: curve.n_unknowns]).merged()
     m, k = len(itinerary.legs), int(np.argmin(itinerary.durations))
     if m < 2 or itinerary.durations[k] > SHORT * itinerary.period:
         return None

@@ -72,9 +72,10 @@ def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
     starts, _, t = shooting.parts(u)
     for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
         along = passage.leg.times, passage.leg.guards
-        if leg.ending is None:
-            # The first leg goes on with it.
-            times, guards = shot.passages[0].leg.times, shot.passages[0].leg.guards
+        if leg.ending is None or leg.is_cut:
+            # The next leg goes on with it.
+            beside = shot.passages[(i + 1) % shooting.m].leg
+            times, guards = beside.times, beside.guards
             beyond = passage.t + times[1] - times[0]
             along = np.append(along[0], beyond), np.hstack([along[1], guards[:, 1:2]])
         found += _inside(shooting, i, leg, t, starts[i], along)
@@ -164,7 +165,7 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
 
     # The motion leads through the zero of its guard.
     code = "GR" if leg.ending.acts else {"surface": "GS", "multiplier": "AS"}.get(kind, "AS")
-    add(code, guard, -own.rates()[place])
+    rate = -float(own.rates()[place])
     # Nothing else ends it at the same place.
     for k, other in enumerate(motions.guards(leg.mode, leg.discrete)):
         if other[0] in ("surface", "multiplier") and other[:2] != guard[:2]:
@@ -175,7 +176,10 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
         beside = motions.at(side, passage.discrete, t, passage.after)
         for k, other in enumerate(motions.guards(side, passage.discrete)):
             if other[:2] == ("surface", surface):
-                add("TF", guard, -beside.rates()[k], _TWO_FOLD)
+                towards = -float(beside.rates()[k])
+                add("TF", guard, towards, _TWO_FOLD)
+                rate *= towards  # the rate of the multiplier has a pole there
+    add(code, guard, rate)
     if leg.ending.acts or kind != "surface":
         return found
     behind = motions.at(following.mode, passage.discrete, t, passage.after)

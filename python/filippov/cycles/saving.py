@@ -148,7 +148,7 @@ def _special(special: Special) -> dict[str, Any]:
 def _state(state: State) -> dict[str, Any]:
     if isinstance(state, Equilibrium):
         return {"w": state._w[: state._curve.n_unknowns].tolist(), "mode": list(state._curve.mode)}
-    itinerary, period = state.itinerary, state._shooting.period
+    itinerary, period = state._parts, state._shooting.period
     legs = [
         [list(leg.mode), list(leg.discrete), None if leg.ending is None else list(leg.ending)]
         for leg in itinerary.legs
@@ -183,8 +183,8 @@ class _Builder:
         for mode, discrete, ending in row["legs"]:
             end = None
             if ending is not None:
-                guard, time, acts = ending
-                end = Ending(None if guard is None else tuple(guard), time, tuple(acts))
+                guard, time, acts, *cuts = ending
+                end = Ending(None if guard is None else tuple(guard), time, tuple(acts), *cuts)
             legs.append(Leg(tuple(mode), tuple(discrete), end))
         starts = tuple(np.array(start) for start in row["starts"])
         itinerary = Itinerary(tuple(legs), row["t0"], starts, tuple(row["durations"]))

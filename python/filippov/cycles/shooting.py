@@ -20,14 +20,18 @@ from filippov.cycles.itinerary import Ending, Itinerary, Leg
 from filippov.cycles.motions import Array, LegEnd, Motions
 from filippov.errors import ModelError
 
-__all__ = ["Passage", "Period", "Shooting", "Shot", "scales", "solve"]
+__all__ = ["Passage", "Period", "Shooting", "Shot", "divided", "scales", "solve"]
 
 Period = GivenPeriod | InferredPeriod | None
 _MOST_STEPS = 30
+# Legs along which perturbations grow by more are divided into parts along which they grow less.
+_GROWTH, _GROWTH_OF_PARTS = 1e3, 30.0
 # A step of so many sizes of a cycle is one of equations that are singular but for rounding; so is a much
 # shorter one where the equations hold to rounding.
 _ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
 _SOLVED = 1e-11
+# A leg that vanishes may last for less than nothing by rounding.
+_NOTHING = 1e-11
 # A cycle whose velocities fall to such a share is an equilibrium.
 _SHRUNK = 1e-6
 
@@ -113,6 +117,24 @@ class Shot(NamedTuple):
             states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
         return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
 
+    def across(self) -> Array | None:
+        """Return the monodromy matrix across the motion, (n - 1, n - 1); nothing where the motion rests.
+
+        The direction of the motion is mapped to itself. Without it the product keeps the digits of the other
+        multipliers, however large they are beside 1.
+        """
+        starts = [passage.leg.velocities[0] for passage in self.passages]
+        if not all(np.isfinite(f).all() and np.any(f) for f in starts):
+            return None
+        normals = [np.linalg.svd(f[None, :])[2][1:].T for f in starts]
+        found = np.eye(len(starts[0]) - 1)
+        for i, passage in enumerate(self.passages):
+            k = (i + 1) % len(starts)
+            step = passage.saltation(starts[k]) @ passage.leg.by_state
+            with np.errstate(invalid="ignore", over="ignore"):
+                found = normals[k].T @ step @ normals[i] @ found
+        return found if np.isfinite(found).all() else None
+
 
 class Shooting:
     """The equations of an itinerary.
@@ -137,6 +159,11 @@ class Shooting:
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
         self._guess = itinerary
+        # The parts of a divided motion keep their shares of it.
+        durations = itinerary.durations
+        self._shares = [
+            durations[i] / durations[i + 1] if leg.is_cut else np.nan for i, leg in enumerate(self.legs)
+        ]
 
     @cached_property
     def swing(self) -> Array:
@@ -203,7 +230,7 @@ class Shooting:
         passages, states, times = [], [], []
         row = m * n
         for i, leg in enumerate(self.legs):
-            if durations[i] <= 0:
+            if durations[i] < -_NOTHING * sum(durations):
                 raise ModelError(f"the duration of piece {i} of the itinerary is {durations[i]:.3g}")
             passage = self._pass(leg, t, starts[i], durations[i], places)
             found = passage.leg
@@ -214,7 +241,11 @@ class Shooting:
             state[:, m * n + i] += found.velocities[1]
             time[m * n + i] = 1.0
             t = passage.t
-            if passage.row is not None:
+            if leg.is_cut:
+                residual[row] = durations[i] - self._shares[i] * durations[i + 1]
+                jacobian[row, m * n + i], jacobian[row, m * n + i + 1] = 1.0, -self._shares[i]
+                row += 1
+            elif passage.row is not None:
                 residual[row] = passage.value
                 jacobian[row] = passage.row[0] * time + passage.row[1 : 1 + n] @ state
                 jacobian[row, size:] += passage.row[1 + n :]
@@ -257,6 +288,8 @@ class Shooting:
     def _end(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
         """Return the equation of the end of a leg, and its derivatives by time, state and parameters."""
         n, k = self.n, len(self.motions.by)
+        if ending.cuts:
+            return 0.0, np.eye(1, 1 + n + k)[0]
         if ending.guard is not None:
             place = self.motions.guards(leg.mode, leg.discrete).index(ending.guard)
             at = self.motions.at(leg.mode, leg.discrete, t, x)
@@ -271,6 +304,35 @@ class Shooting:
         row = np.zeros(1 + n + k)
         row[0] = 1.0
         return t - ending.time, row
+
+
+def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] | None:
+    """Return the equations with those legs divided along which perturbations grow much; nothing if none is.
+
+    In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
+    """
+    itinerary, motions = shooting.itinerary(u), shooting.motions
+    growths = [float(np.linalg.norm(passage.leg.by_state, 2)) for passage in shot.passages]
+    if not np.isfinite(growths).all() or max(growths) < _GROWTH:
+        return None
+    legs: list[Leg] = []
+    starts: list[Array] = []
+    durations: list[float] = []
+    t = itinerary.t0
+    for leg, x, duration, growth in zip(
+        itinerary.legs, itinerary.starts, itinerary.durations, growths, strict=True
+    ):
+        count = 1 if growth < _GROWTH else int(np.ceil(np.log(growth) / np.log(_GROWTH_OF_PARTS)))
+        part = duration / count
+        for k in range(count):
+            starts.append(motions.leg(leg.mode, leg.discrete, t, x, k * part).x if k else x)
+            end = Ending(None, t + (k + 1) * part, (), cuts=True)
+            legs.append(leg if k + 1 == count else leg._replace(ending=end))
+            durations.append(part)
+        t += duration
+    parts = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
+    finer = Shooting(motions, parts, shooting.period)
+    return finer, finer.unknowns(parts)
 
 
 def scales(shooting: Shooting, u: Array) -> Array:
