@@ -680,6 +680,7 @@ def test_two_folds_at_the_end_of_sliding() -> None:
         assert abs(fold.params["mu"]) < 1e-10
         assert abs(np.sin(fold.t) - 0.5) < 1e-9
         assert branch.reasons[way].startswith("behind TF")
+        assert abs(branch.values("mu")[0 if way == "below" else -1]) < 0.02
         assert np.all(np.sign(branch.values("mu")) == np.sign(mu))
         for point in branch.points:
             assert {str(mode) for mode in point.state.modes} == ({"0", "+"} if mu > 0 else {"0", "-"})

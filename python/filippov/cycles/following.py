@@ -20,7 +20,14 @@ from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
-from filippov.cycles.passing import SHORT, back_from_change, beyond_change, flow_near, without_short_leg
+from filippov.cycles.passing import (
+    SHORT,
+    back_from_change,
+    beyond_change,
+    distance_from,
+    flow_near,
+    without_short_leg,
+)
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.switching import single_at_doubling
 from filippov.cycles.zero import zero_between
@@ -33,10 +40,13 @@ __all__ = ["at_value", "continuation"]
 AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
+_STEP_BEHIND = 2e-3
 _WIDTH = 1e-13
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
 _UNBOUNDED, _STANDS = 1e4, 1e-8
+# How far, by its size, a cycle is another one.
+_JUMPS = 0.2
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
@@ -319,7 +329,7 @@ class _Side:
                 self.reason = f"{self.settings.name} = {self.here.w[-1]:g} is the end of the range"
                 self._add("EP", None, self.here.curve, self.points[-1].state)
                 return
-            n_special = len(self.special)
+            n_special, curve = len(self.special), self.here.curve
             try:
                 step, next_one = self._step(ds)
                 goes_on = self._accept(step, next_one)
@@ -339,6 +349,9 @@ class _Side:
                 continue
             if not goes_on or self._closes() or self._vanishes() or self._grows():
                 return
+            if self.here.curve is not curve:
+                ds = min(ds, _STEP_BEHIND)  # near a fold of both the branch bends much
+                continue
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
         self.reason = f"{self.settings.most} points"
 
@@ -592,7 +605,10 @@ class _Side:
             new = flow_near(curve, w + reach * ds * tangent * scale)
             if new is None or new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
                 continue
-            if self._turns_to(new, -direction, value) or self._passes_to(new, direction, ds):
+            jumps = distance_from(curve, w, new) > _JUMPS
+            if self._turns_to(new, -direction, value, jumps):
+                return True
+            if not jumps and self._passes_to(new, direction, ds):
                 return True
         # At a non-smooth fold the cycle without the leg is on this side, and ends at the same point.
         shorter = without_short_leg(curve, w)
@@ -631,7 +647,7 @@ class _Side:
             return True
         return False
 
-    def _turns_to(self, new: Cycle, direction: float, value: float) -> bool:
+    def _turns_to(self, new: Cycle, direction: float, value: float, jumps: bool = False) -> bool:
         """Go on with a cycle, away from the point that it comes to on the way to a value of the parameter.
 
         Parameters
@@ -641,6 +657,8 @@ class _Side:
             In which direction the parameter leads to the point.
         value : float
             A value behind it.
+        jumps : bool, optional
+            The cycle is another one, and the branch ends at the point.
 
         Returns
         -------
@@ -652,7 +670,10 @@ class _Side:
             self._locate_behind(back, value)
         except ModelError:
             return False
-        if self.settings.switch == "follow":
+        if jumps:
+            self.reason = f"behind {self.special[-1]!r} the flow jumps to another cycle"
+            self.is_stopped = True
+        elif self.settings.switch == "follow":
             self._go_on(back.turned(), new)
         else:
             self.reason, self.is_stopped = f"{self.special[-1]!r}", True

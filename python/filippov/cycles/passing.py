@@ -22,7 +22,7 @@ from filippov.cycles.motions import Array
 from filippov.cycles.shooting import Shooting
 from filippov.errors import ModelError
 
-__all__ = ["SHORT", "back_from_change", "beyond_change", "flow_near", "without_short_leg"]
+__all__ = ["SHORT", "back_from_change", "beyond_change", "distance_from", "flow_near", "without_short_leg"]
 
 _REACHES = (1.0, 3.0, 0.3, 0.1)
 _LENGTHS = (1e-3, 3e-3, 1e-2, 3e-4, 1e-4, 1e-5)
@@ -48,7 +48,7 @@ def beyond_change(curve: CycleCurve, located: Step, beyond: Array) -> Cycle | No
         new = flow_near(curve, w)
         if new is None or new.itinerary.is_same(itinerary):
             return None
-        distance = _distance(curve, w, new)
+        distance = distance_from(curve, w, new)
         return new, distance, float(np.max(np.abs((w - located.w) / scale)))
 
     for reach in _REACHES:
@@ -106,7 +106,7 @@ def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
     return found
 
 
-def _distance(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
+def distance_from(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
     """Return how far a cycle is from a point of a curve, in the middles of its legs and by its size."""
     points = np.array([cycle.at(cycle.t0 + cycle.period * k / _PLACES) for k in range(_PLACES)])
     size = np.ptp(points, axis=0) + 1e-300
