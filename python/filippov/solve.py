@@ -373,11 +373,13 @@ def _solve(
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run, used = run_of(prepared, choices)
         if run.reason == "field_not_finite" and t0 < t1:
-            ended = system.prepare_with_ends_of_roots(prepared, n, t0, state, values)
-            if ended is not None:
-                beyond, ended = run_of(ended, choices)
-                if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
-                    run, used = beyond, ended
+            parameters, nearest = parameter_vector(values), float(np.max(options.atol))
+            for ended in system.prepare_with_ends_of_roots(prepared, n, t0, state, values):
+                beyond, ending = run_of(ended, choices)
+                if isinstance(beyond, Run) and ending.stays_where_roots_are(beyond, parameters, nearest):
+                    run, used = beyond, ending
+                if run.status >= 0:
+                    break
         has_events = specs is not None
         solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
         if wanted is not None:
