@@ -557,7 +557,7 @@ class System(Points, Saving):
     def prepare_with_ends_of_roots(
         self, prepared: Prepared, n: int, t0: float, y0: Array, values: dict[str, float]
     ) -> Iterator[Prepared]:
-        """Yield the system whose roots are zero beyond their end, a surface, if it has any; with a floor last."""
+        """Yield the system whose roots are zero beyond their end, a surface, if any; then with a floor."""
         if self._source is None or prepared.trace is None or not prepared.trace.has_roots:
             return
         for kind in ("surface", "floor"):

@@ -1,4 +1,4 @@
-"""Random control loops: targets in finite time against regularised runs, saturated relays against laws written out.
+"""Random control loops: targets in finite time against regularised runs, limiters against laws written out.
 
 ``python -m fuzz.controllers --n 2000 --saturated 1000``, with ``tests`` on the path.
 """
@@ -25,10 +25,11 @@ Array = npt.NDArray[np.float64]
 
 # The widths of the layers in the regularised runs. Their difference is what the larger width costs.
 WIDTHS = (1e-4, 1e-5)
-# The states of the regularised run of the smaller width differ from the limit by less than those of the two widths do: their
-# errors are multiples of some power of the width. Three times as much is allowed, and what is lost by tolerances.
+# The errors of the regularised runs are multiples of some power of the width: that of the smaller one is less
+# than the difference of the two. Three times as much is allowed, and what is lost by tolerances.
 ALLOWED, NOISE = 3.0, 2e-5
-# Where the two widths differ by more than this, the reference says nothing: a motion that grows from rounding.
+# Where the two widths differ by more than this, the reference says nothing: a motion that grows from
+# rounding.
 UNRESOLVED = 0.03
 TIMES = 80
 
@@ -84,13 +85,17 @@ def random_loop(seed: int) -> Loop:
         "damped relay": f"x[1], -{k1}*sg(x[0]) - {number(0.2, 1.0)}*x[1] + {d}",
         "twisting": f"x[1], -{k1}*sg(x[0]) - {number(-0.1, 1.2)}*sg(x[1]) + {d}",
         "super-twisting": f"-{k2}*rt(ab(x[0]))*sg(x[0]) + x[1], -{k1}*sg(x[0]) + {d}",
-        "terminal": f"x[1], -{power}*ab(x[0])**{power - 1:.3f}*x[1] - {k1}*sg(x[1] + ab(x[0])**{power}*sg(x[0]))",
+        "terminal": (
+            f"x[1], -{power}*ab(x[0])**{power - 1:.3f}*x[1] - {k1}*sg(x[1] + ab(x[0])**{power}*sg(x[0]))"
+        ),
         "nonsingular terminal": (
             f"x[1], -{1 / (1 + power):.6f}*sg(x[1])*ab(x[1])**{1 - power:.3f}"
             f" - {k1 + 1}*sg(x[0] + sg(x[1])*ab(x[1])**{1 + power}) + {d}"
         ),
         "relay, third order": f"x[1], x[2], -{k1}*sg(x[2] + 2*x[1] + {k2}*x[0]) + {d}",
-        "twisting, third order": f"x[1], -{k1}*sg(x[0] - x[2]) - {k2}*sg(x[1] + x[2]) + {d}, -{number(0.5, 2.0)}*x[2]",
+        "twisting, third order": (
+            f"x[1], -{k1}*sg(x[0] - x[2]) - {k2}*sg(x[1] + x[2]) + {d}, -{number(0.5, 2.0)}*x[2]"
+        ),
         "super-twisting, third order": (
             f"x[1], -x[1] - {k2}*rt(ab({s}))*sg({s}) + x[2] + 0.3*sin(x[0]), -{k1}*sg({s}) + {d}"
         ),
@@ -129,7 +134,13 @@ def check_loop(seed: int) -> tuple[str, list[str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fl.FilippovWarning)
         sol = fl.solve_ivp(
-            loop.rhs(np.sign), (0.0, loop.t_end), loop.y0, rtol=1e-8, atol=1e-10, max_events=200_000, max_wall_time=30
+            loop.rhs(np.sign),
+            (0.0, loop.t_end),
+            loop.y0,
+            rtol=1e-8,
+            atol=1e-10,
+            max_events=200_000,
+            max_wall_time=30,
         )
     if not sol.success:
         return "stops", [f"stops at {sol.t[-1]:.6g}: {sol.message}"]
@@ -163,7 +174,7 @@ LAWS = {
 
 
 class Saturated(NamedTuple):
-    """A random loop with a relay inside of a limiter, and the same law written out for both signs of the relay."""
+    """A random loop with a relay inside of a limiter, and the law written out for both signs of the relay."""
 
     nested: str
     written: str
@@ -235,7 +246,13 @@ def main() -> int:
             if wrong:
                 n_failed += 1
                 source = random_loop(seed) if check is check_loop else random_saturated(seed)
-                print(f"--- {name} {seed}", *(f"  {text}" for text in wrong), f"  {source}", sep="\n", flush=True)
+                print(
+                    f"--- {name} {seed}",
+                    *(f"  {text}" for text in wrong),
+                    f"  {source}",
+                    sep="\n",
+                    flush=True,
+                )
         print(f"{count} of {name}, {time.monotonic() - start:.0f} s:", dict(ends))
     print(f"{n_failed} violations")
     return 1 if n_failed else 0

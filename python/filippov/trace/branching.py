@@ -453,8 +453,9 @@ class Tracer:
     def with_ends_of_roots(self, field: list[int], root_ends: str) -> list[int]:
         """Return a field whose cube roots switch with the sign of their argument: at zero they have no slope.
 
-        With `root_ends` the other roots switch too, and are zero where their argument is negative; if it is ``"floor"``, in
-        both modes: a step that starts at the end of a root may look beyond it, however short it is.
+        With `root_ends` the other roots switch too, and are zero where their argument is negative; if it is
+        ``"floor"``, in both modes: a step that starts at the end of a root may look beyond it, however short
+        it is.
         """
         builder = self.builder
         images: list[tuple[int, int]] = []

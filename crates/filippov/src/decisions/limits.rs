@@ -36,7 +36,9 @@ impl Limit {
         let ratios = [b / a, c / b];
         let noise = ROUNDING * turns[3].t.abs() / c;
         shrinks_by(ratios).filter(|_| is_no_power(ratios, noise))?;
-        let limit_of = |series: [f64; 3]| limit_of_series(series, ratios);
+        // Between impacts other bodies go on freely, by squares of the time.
+        let is_corrected = turns[3].kind == Kind::Reset && ratios[1] <= SLOW_SHRINKING;
+        let limit_of = |series: [f64; 3]| limit_of_series(series, ratios, is_corrected);
         let states = turns[3].y_after.iter().enumerate();
         let states = states.map(|(i, y)| limit_of([turns[1].y_after[i], turns[2].y_after[i], *y]));
         Some(Limit {
@@ -49,10 +51,14 @@ impl Limit {
 }
 
 /// The limit of a series whose steps shrink by the ratio r, from its last members and the last two quotients of its steps: up to a
-/// multiple of r^(3n), where the ratio is not near 1; else up to one of r^(2n), as the difference of two such limits is noise.
-fn limit_of_series([first, before, last]: [f64; 3], [earlier, ratio]: [f64; 2]) -> f64 {
+/// multiple of r^(2n), or with the difference of two such limits of r^(3n).
+fn limit_of_series(
+    [first, before, last]: [f64; 3],
+    [earlier, ratio]: [f64; 2],
+    is_corrected: bool,
+) -> f64 {
     let limit = last + ratio / (1.0 - ratio) * (last - before);
-    if ratio > SLOW_SHRINKING {
+    if !is_corrected {
         return limit;
     }
     let limit_before = before + earlier / (1.0 - earlier) * (before - first);
@@ -154,8 +160,7 @@ fn limit_of_flights(at: &Point, flights: usize) -> Result<Option<Limit>, FieldEr
     let shrinks = match first.filter(|before| before.iter().all(is_same)) {
         Some(before) => {
             let r = b / (second.t - before[0].t);
-            r.max(s) <= FAST_SHRINKING
-                || shrinks_by([r, s]).is_some() && is_no_power([r, s], noise)
+            r.max(s) <= FAST_SHRINKING || shrinks_by([r, s]).is_some() && is_no_power([r, s], noise)
         }
         None => s <= FAST_SHRINKING * FAST_SHRINKING,
     };

@@ -35,8 +35,10 @@ pub(super) fn stay_if_nothing_leaves(
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
         let velocity = at.velocity(notes, &stays.mode, &[])?;
         let size = at.corners(notes, meeting.surfaces, meeting.mode)?.size();
-        let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
-        return Ok(is_rest.then_some(stays));
+        if velocity.iter().all(|v| v.is_finite()) {
+            let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
+            return Ok(is_rest.then_some(stays));
+        }
     }
     let is_isolated = m >= at.x.len();
     if !is_isolated || at.system.depends_on_time() || moves_on(at, notes, meeting)? {

@@ -8,8 +8,8 @@ use super::point::{Notes, Point};
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::status::{Warning, WarningCode};
-use crate::switch::Switch;
-use crate::tolerances::SAME_MEAN;
+use crate::switch::{Kind, Switch};
+use crate::tolerances::{SAME_MEAN, STEADY_ROUNDS};
 
 /// The rounds that the last switches make, one after the other.
 #[derive(Debug, Default)]
@@ -18,12 +18,14 @@ pub(crate) struct Rounds {
     turn: Option<usize>,
     /// Switches since the rounds began.
     n: usize,
-    /// The largest round since then, in units of the tolerance.
+    /// The largest round since then, in units of the tolerance, and the longest.
     largest: f64,
+    longest: f64,
 }
 
 impl Rounds {
-    /// Takes the last of these switches down. Is the last round smaller than the tolerance, after one of at least twice its size?
+    /// Takes the last of these switches down. Is the last round, of crossings only, smaller than the tolerance, after one of at least
+    /// twice its size, and twice as long?
     pub fn are_small(&mut self, switches: &[Switch], scale: &ErrorScale) -> bool {
         let Some(last) = switches.len().checked_sub(1) else {
             return false;
@@ -43,10 +45,13 @@ impl Rounds {
         if self.n % turn != 0 {
             return false;
         }
-        let extents = extents_of(&switches[last - turn..]);
-        let size = scale.largest(&extents, &switches[last].y_after);
+        let round = &switches[last - turn..];
+        let size = scale.largest(&extents_of(round), &switches[last].y_after);
+        let duration = switches[last].t - round[0].t;
         self.largest = self.largest.max(size);
-        size <= 1.0 && 2.0 * size <= self.largest
+        self.longest = self.longest.max(duration);
+        let is_half = 2.0 * size <= self.largest && 2.0 * duration <= self.longest;
+        size <= 1.0 && is_half && round.iter().all(|s| s.kind == Kind::Crossing)
     }
 }
 
@@ -74,7 +79,8 @@ pub(crate) fn mean_of_rounds(at: &Point, notes: &mut Notes) -> Result<Option<Lim
         return Ok(None);
     };
     let [before, now] = [&switches[last - turn], &switches[last]];
-    if distance(at, &meeting, now)? >= distance(at, &meeting, before)? {
+    let ratio = distance(at, &meeting, now)? / distance(at, &meeting, before)?;
+    if !(ratio > STEADY_ROUNDS && ratio < 1.0) {
         return Ok(None);
     }
     let mut limit = Limit {

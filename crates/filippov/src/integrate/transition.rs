@@ -366,7 +366,9 @@ impl<'a> Integrator<'a> {
             _ => {}
         }
         self.evaluate_start()?;
-        if self.run.motion.sliding.len() > 1 {
+        // Rounds whose mean is followed turn around it.
+        let is_mean = |last: &Warning| last.code == WarningCode::Averaged && last.t == self.run.t;
+        if self.run.motion.sliding.len() > 1 && !self.warnings.last().is_some_and(is_mean) {
             self.ask(Cause::Start, |at, notes| {
                 warn_oscillation(at, notes);
                 Ok(())
