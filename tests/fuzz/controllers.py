@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp as solve_stiff
 
-__all__ = ["FAMILIES", "Loop", "check_loop", "check_saturated", "random_loop", "random_saturated"]
+__all__ = ["FAMILIES", "LAWS", "Loop", "check_loop", "check_saturated", "random_loop", "random_saturated"]
 
 Array = npt.NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def check_loop(seed: int) -> tuple[str, list[str]]:
             rtol=1e-8,
             atol=1e-10,
             max_events=200_000,
-            max_wall_time=30,
+            max_steps=400_000,
         )
     if not sol.success:
         return "stops", [f"stops at {sol.t[-1]:.6g}: {sol.message}"]

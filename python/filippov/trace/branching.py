@@ -40,8 +40,8 @@ MOST_COMBINATIONS = 1024
 MOST_AFTER_MANY = 32
 MANY = 3
 
-# An expression that jumps is taken apart into that many parts at most.
-MOST_JUMPING_PARTS = 8
+# An expression that jumps is taken apart into that many parts at most: a limiter of a limiter has a dozen.
+MOST_JUMPING_PARTS = 32
 
 
 @dataclass(frozen=True)

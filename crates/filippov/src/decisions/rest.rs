@@ -86,11 +86,13 @@ pub(crate) fn rest_within_tolerance(
     let h = there.surface_values(notes, signs)?;
     for &j in &surfaces {
         at.system.gradient(j, &there.place(signs), &mut row)?;
-        if !(h[j].abs() <= AT_SIDE * at.scale.along(&row, at.x)) {
+        let is_on = h[j].abs() <= AT_SIDE * at.scale.along(&row, at.x);
+        if !is_on {
             return Ok(None);
         }
     }
-    if !(at.scale.largest(&shift, at.x) <= 1.0) {
+    let is_near = at.scale.largest(&shift, at.x) <= 1.0;
+    if !is_near {
         return Ok(None);
     }
     let meeting = Meeting::new(at.arrival.mode, &surfaces, &surfaces, How::Limit);

@@ -80,7 +80,8 @@ pub(crate) fn mean_of_rounds(at: &Point, notes: &mut Notes) -> Result<Option<Lim
     };
     let [before, now] = [&switches[last - turn], &switches[last]];
     let ratio = distance(at, &meeting, now)? / distance(at, &meeting, before)?;
-    if !(ratio > STEADY_ROUNDS && ratio < 1.0) {
+    let shrinks_slowly = ratio > STEADY_ROUNDS && ratio < 1.0;
+    if !shrinks_slowly {
         return Ok(None);
     }
     let mut limit = Limit {
