@@ -388,6 +388,7 @@ def load_system(
     list[float] | None,
     list[tuple[str, list[float], TracedSystem | None, str]],
 ]: ...
+
 @final
 class PageModel:
     def __new__(cls, data: bytes) -> Self: ...
@@ -395,9 +396,7 @@ class PageModel:
     def of_calls(
         make: Callable[
             [list[float], float, list[float]],
-            tuple[
-                TracedSystem | OpaqueSystem | SignedSystem, Sequence[tuple[str, list[float], Any, str]]
-            ],
+            tuple[TracedSystem | OpaqueSystem | SignedSystem, Sequence[tuple[str, list[float], Any, str]]],
         ],
         states: Sequence[str],
         params: dict[str, float],
