@@ -137,8 +137,8 @@ class Report:
     Parameters
     ----------
     function : callable
-        Of the time that a run reached and of the number of switches in one place there, if they are very many;
-        for many runs of the time and of the number of those that are finished.
+        Of the time that a run reached, and of the number of switches in one place there if they are very
+        many; for many runs of the time and of the number of those that are finished.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
