@@ -110,7 +110,11 @@ def texts_of_problems() -> dict[str, str]:
         for argument in def_.args.args:
             argument.annotation = None
         def_.args.defaults = [ast.Constant(value) for value in problem.args]
-        texts[name] = "import numpy as np\n\n" + ast.unparse(def_) + "\n"
+        around = inspect.getmodule(problem.fun)
+        read = {node.id for node in ast.walk(def_) if isinstance(node, ast.Name)}
+        known = {name: value for name, value in vars(around).items() if isinstance(value, (int, float))}
+        constants = "".join(f"{key} = {value!r}\n" for key, value in known.items() if key in read)
+        texts[name] = f"import numpy as np\n\n{constants}\n{ast.unparse(def_)}\n"
     return texts
 
 

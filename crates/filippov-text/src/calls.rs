@@ -113,17 +113,18 @@ impl Reader<'_> {
                 "abs" | "fabs" | "absolute" => Ok(Value::float(value.abs())),
                 "sqrt" if value >= 0.0 => Ok(Value::float(value.sqrt())),
                 "sign" if value != 0.0 => Ok(Value::float(value.signum())),
-                _ => refuse(
+                _ if unary_operation(name).is_some() => refuse(
                     call,
                     format!("{function} of a number: write its value, whose last digit is that of a platform"),
                 ),
+                _ => self.unknown(call, function),
             };
         }
         if matches!(a, Value::Condition(_) | Value::Truth(_)) {
             return refuse(call, format!("{function} of a comparison is not read here"));
         }
         let node = self.tracer.node(call, a)?;
-        let op = match name {
+        match name {
             "abs" | "fabs" | "absolute" => {
                 return Ok(Value::Node(self.tracer.absolute(call, node)?))
             }
@@ -137,30 +138,12 @@ impl Reader<'_> {
             }
             "deg2rad" | "radians" => return self.scaled(call, node, PI / 180.0),
             "rad2deg" | "degrees" => return self.scaled(call, node, 180.0 / PI),
-            "negative" => UnaryOp::Neg,
-            "sqrt" => UnaryOp::Sqrt,
-            "exp" => UnaryOp::Exp,
-            "expm1" => UnaryOp::Expm1,
-            "exp2" => UnaryOp::Exp2,
-            "log" => UnaryOp::Log,
-            "log1p" => UnaryOp::Log1p,
-            "log2" => UnaryOp::Log2,
-            "log10" => UnaryOp::Log10,
-            "sin" => UnaryOp::Sin,
-            "cos" => UnaryOp::Cos,
-            "tan" => UnaryOp::Tan,
-            "arcsin" | "asin" => UnaryOp::Asin,
-            "arccos" | "acos" => UnaryOp::Acos,
-            "arctan" | "atan" => UnaryOp::Atan,
-            "sinh" => UnaryOp::Sinh,
-            "cosh" => UnaryOp::Cosh,
-            "tanh" => UnaryOp::Tanh,
-            "arcsinh" | "asinh" => UnaryOp::Asinh,
-            "arccosh" | "acosh" => UnaryOp::Acosh,
-            "arctanh" | "atanh" => UnaryOp::Atanh,
-            _ => return self.unknown(call, function),
-        };
-        Ok(Value::Node(self.tracer.unary(call, op, node)?))
+            _ => {}
+        }
+        match unary_operation(name) {
+            Some(op) => Ok(Value::Node(self.tracer.unary(call, op, node)?)),
+            None => self.unknown(call, function),
+        }
     }
 
     fn scaled(&mut self, call: &ExprCall, a: NodeId, factor: f64) -> Result<Value, Refused> {
@@ -253,4 +236,32 @@ impl Reader<'_> {
         );
         Ok(Value::Node(self.tracer.choose(&condition, plus, minus)))
     }
+}
+
+/// The operation behind the name of a function of one number.
+fn unary_operation(name: &str) -> Option<UnaryOp> {
+    Some(match name {
+        "negative" => UnaryOp::Neg,
+        "sqrt" => UnaryOp::Sqrt,
+        "exp" => UnaryOp::Exp,
+        "expm1" => UnaryOp::Expm1,
+        "exp2" => UnaryOp::Exp2,
+        "log" => UnaryOp::Log,
+        "log1p" => UnaryOp::Log1p,
+        "log2" => UnaryOp::Log2,
+        "log10" => UnaryOp::Log10,
+        "sin" => UnaryOp::Sin,
+        "cos" => UnaryOp::Cos,
+        "tan" => UnaryOp::Tan,
+        "arcsin" | "asin" => UnaryOp::Asin,
+        "arccos" | "acos" => UnaryOp::Acos,
+        "arctan" | "atan" => UnaryOp::Atan,
+        "sinh" => UnaryOp::Sinh,
+        "cosh" => UnaryOp::Cosh,
+        "tanh" => UnaryOp::Tanh,
+        "arcsinh" | "asinh" => UnaryOp::Asinh,
+        "arccosh" | "acosh" => UnaryOp::Acosh,
+        "arctanh" | "atanh" => UnaryOp::Atanh,
+        _ => return None,
+    })
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use filippov::{Definition, SavedSystem};
 use filippov_expr::Names;
+use ruff_python_ast::visitor::{walk_expr, walk_stmt, Visitor};
 use ruff_python_ast::{Expr, Stmt, StmtFunctionDef};
 
 use crate::statements::Reader;
@@ -235,38 +236,59 @@ fn states_of(body: &[Stmt], state: &str) -> Vec<String> {
             };
         }
     }
-    let mut most = 0;
-    Indices {
+    let counting = Counting {
         state,
-        most: &mut most,
-    }
-    .look(body);
-    vec![String::new(); most + 1]
+        largest: 0,
+        returned: None,
+    };
+    vec![String::new(); counting.counted(body)]
 }
 
-/// Looks for the largest index of the state.
-struct Indices<'a> {
+/// Counts the states of a function that does not unpack them: as many as are returned in the first list or tuple, and as many as
+/// are indexed if there is none.
+struct Counting<'a> {
     state: &'a str,
-    most: &'a mut usize,
+    largest: usize,
+    returned: Option<usize>,
 }
 
-impl Indices<'_> {
-    fn look(self, body: &[Stmt]) {
-        use ruff_python_ast::visitor::Visitor;
+impl Counting<'_> {
+    fn counted(mut self, body: &[Stmt]) -> usize {
+        self.visit_body(body);
+        self.returned.unwrap_or(self.largest + 1)
+    }
+}
 
-        struct Walk<'a>(Indices<'a>);
-        impl<'b> Visitor<'b> for Walk<'_> {
-            fn visit_expr(&mut self, expression: &'b Expr) {
-                if let Expr::Subscript(part) = expression {
-                    let is_state = matches!(&*part.value, Expr::Name(name) if name.id.as_str() == self.0.state);
-                    if let (true, Some(index)) = (is_state, literal_index(&part.slice)) {
-                        *self.0.most = (*self.0.most).max(index);
-                    }
-                }
-                ruff_python_ast::visitor::walk_expr(self, expression);
+impl<'b> Visitor<'b> for Counting<'_> {
+    fn visit_stmt(&mut self, statement: &'b Stmt) {
+        if let (Stmt::Return(found), None) = (statement, self.returned) {
+            self.returned = found.value.as_deref().and_then(entries);
+        }
+        walk_stmt(self, statement);
+    }
+
+    fn visit_expr(&mut self, expression: &'b Expr) {
+        if let Expr::Subscript(part) = expression {
+            let is_state =
+                matches!(&*part.value, Expr::Name(name) if name.id.as_str() == self.state);
+            if let (true, Some(index)) = (is_state, literal_index(&part.slice)) {
+                self.largest = self.largest.max(index);
             }
         }
-        Walk(self).visit_body(body);
+        walk_expr(self, expression);
+    }
+}
+
+/// The number of entries of a tuple, a list, or an array of one.
+fn entries(value: &Expr) -> Option<usize> {
+    match value {
+        Expr::Tuple(tuple) => Some(tuple.elts.len()),
+        Expr::List(list) => Some(list.elts.len()),
+        Expr::Call(call) => call.arguments.args.first().and_then(|first| match first {
+            Expr::Tuple(_) | Expr::List(_) => entries(first),
+            _ => None,
+        }),
+        _ => None,
     }
 }
 
