@@ -431,3 +431,36 @@ def test_a_field_that_depends_on_time_is_that_of_the_marked_instant(open_page: A
     settle(page)
     assert front(page, "motion.plane.instant") == 0
     assert front(page, ends) == before
+
+
+def test_a_model_is_typed_in_the_page(open_page: Any) -> None:
+    if not (STATIC / "filippov_text.wasm").exists():
+        pytest.skip("the reader of Python text was not built: filippov_text.wasm is missing")
+    page = open_page("#p=biased_relay")
+    page.get_by_role("tab", name="Model").click()
+    page.get_by_text("no Python runs").wait_for()
+    area = page.get_by_label("The right-hand side in Python")
+    area.fill("def f(t, x):\n    y, v = x\n    while v:\n        v = 0\n    return v, -y\n")
+    page.get_by_role("button", name="Use this text").click()
+    page.locator(".editor .wrong").wait_for()
+    assert page.locator(".editor .wrong").inner_text().startswith("Line 3")
+    text = "import numpy as np\n\ndef drum(t, x, k=2.0):\n    y, v = x\n    return v, -k * y - np.sign(v)\n"
+    area.fill(text)
+    area.press("Control+Enter")
+    wait_until(page, "document.querySelector('#app').front?.model.n === 2")
+    settle(page)
+    assert front(page, "model.params") == [{"name": "k", "value": 2}]
+    assert front(page, "run.switches.length") > 0
+    assert page.get_by_role("tab", name="Model").get_attribute("aria-selected") == "true"
+    assert area.input_value() == text
+    other = open_page(front(page, "fragment()"))
+    assert front(other, "run.switches") == front(page, "run.switches")
+
+
+def test_a_page_without_the_reader_shows_the_text_and_says_so(open_page: Any) -> None:
+    script = """const get = window.fetch;
+    window.fetch = (a, ...b) => String(a).includes("_text") ? Promise.reject(new Error()) : get(a, ...b);"""
+    page = open_page(script=script)
+    page.get_by_role("tab", name="Model").click()
+    page.get_by_text("no reader of Python text").wait_for()
+    assert not page.get_by_role("button", name="Use this text").is_visible()

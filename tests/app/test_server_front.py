@@ -160,6 +160,7 @@ def test_cycles_and_branches_come_from_the_kernel(at_server: Any) -> None:
     page.get_by_role("button", name="Find the cycle").click()
     page.get_by_text("A cycle, played.").wait_for()
     assert asked[-1]["y0"] == front(page, "run.y.slice(-2)"), "from the end of the run on the screen"
+    assert asked[-1]["t0"] == front(page, "run.t.at(-1)")
     assert "0.5 + 0.25i" in page.locator(".places").inner_text()
     assert front(page, "motion.cycle.t.length") == 50
     page.get_by_role("button", name="Follow").click()

@@ -31,7 +31,7 @@ export class CyclesPanel implements Panel {
   private of: "cycle" | "equilibrium" = "cycle";
   private foundFor = "";
   /** A point of the cycle that was found: the branch starts there. */
-  private start: number[] | null = null;
+  private start: { readonly t0: number; readonly y0: number[] } | null = null;
 
   constructor(private readonly context: Context) {
     const { model } = context;
@@ -151,9 +151,9 @@ export class CyclesPanel implements Panel {
     this.words.textContent = "The kernel is looking for it.";
     try {
       const section = state.section === null ? {} : { section: sectionRequest(state.section, state.params) };
-      const request = { kind: "cycle", ...motionRequest(state), y0: this.context.end() ?? state.y0, ...section };
+      const request = { kind: "cycle", ...motionRequest(state), ...this.context.end(), ...section };
       const cycle = toCycle(await engine.ask(request, signal));
-      this.start = [...cycle.run.y.subarray(0, cycle.run.n)];
+      this.start = { t0: cycle.run.t[0], y0: [...cycle.run.y.subarray(0, cycle.run.n)] };
       this.foundFor = this.motionKey();
       this.context.showCycle(cycle.run);
       this.words.textContent =
@@ -173,8 +173,8 @@ export class CyclesPanel implements Panel {
     this.branchWords.textContent = "The kernel is following it.";
     try {
       const { parameter, range } = state;
-      const y0 = this.start ?? this.context.end() ?? state.y0;
-      const request = { kind: "continuation", ...motionRequest(state), y0, parameter, range, of: this.of };
+      const start = this.start ?? this.context.end();
+      const request = { kind: "continuation", ...motionRequest(state), ...start, parameter, range, of: this.of };
       this.branch = toBranch(await engine.ask(request, signal));
       const special = this.branch.special.map(
         ({ code, value, text }) => `${code} at ${showName(this.branch!.parameter)} = ${showNumber(value, 5)}, ${text}`,

@@ -66,7 +66,7 @@ export interface EditorOptions {
   /** The reader, or `null` where the page has none. */
   reader(): Promise<TextReader | null>;
   /** Open a model that was read. */
-  open(model: Uint8Array, text: string): void;
+  open(model: Uint8Array): void;
 }
 
 const EXAMPLE = `import numpy as np
@@ -118,7 +118,7 @@ export function makeEditor(options: EditorOptions): Editor {
       const model = reader.read(area.value);
       words.className = "quiet";
       words.textContent = "";
-      options.open(model, area.value);
+      options.open(model);
     } catch (error) {
       words.className = "wrong";
       const { line, column, message } = error as TextError;

@@ -41,7 +41,7 @@ export interface Host {
   /** Whether the host is dark; by default as the system says. */
   readonly dark?: boolean;
   openProblem?(name: string): void;
-  openModel?(model: Uint8Array, text: string): void;
+  openModel?(model: Uint8Array): void;
   reader(): Promise<TextReader | null>;
   /** The state has changed, and the motion with it. */
   changed?(state: State): void;
@@ -132,6 +132,11 @@ export class Front {
     return name ? `${name} · filippov` : "filippov";
   }
 
+  /** What the user has set. */
+  get view(): Readonly<State> {
+    return this.state;
+  }
+
   /** The run on the screen. */
   get run(): Run | null {
     return this.motion.run;
@@ -170,7 +175,7 @@ export class Front {
       window: () => this.motion.window(),
       end: () => {
         const { run } = this.motion;
-        return run === null ? null : [...run.y.subarray(run.y.length - run.n)];
+        return run === null ? null : { t0: run.t[run.t.length - 1], y0: [...run.y.subarray(run.y.length - run.n)] };
       },
       showCycle: (run) => this.motion.showCycle(run),
       start: (y0) => {
@@ -532,7 +537,7 @@ export class Front {
     this.editor = makeEditor({
       text: model.page.text,
       reader: () => (host.openModel ? host.reader() : Promise.resolve(null)),
-      open: (bytes, text) => host.openModel?.(bytes, text),
+      open: (bytes) => host.openModel?.(bytes),
     });
     return make("div", { class: "panel model" }, facts, this.editor.element);
   }

@@ -65,11 +65,13 @@ export async function boot(element: HTMLElement): Promise<void> {
 }
 
 /** Make the engines of a model, and what puts its front into the page. */
-type Show = (bytes: Uint8Array, problem: string | null, kernel?: Engine | null) => Promise<() => Front>;
+type Show = (bytes: Uint8Array, problem: string | null, kernel?: Engine | null) => Promise<Make>;
+/** Put the front into the page, with the view of the link or another one. */
+type Make = (view?: unknown) => Front;
 type Open = (again: () => Promise<void>) => void;
 
 /** All that is needed for a front; it is put into the element by the function returned, when all has come. */
-async function fromAddress(element: HTMLElement, home: string, run: Open): Promise<() => Front> {
+async function fromAddress(element: HTMLElement, home: string, run: Open): Promise<Make> {
   const fragment = await readFragment(location.hash);
   const problems = await fetchProblems();
   const goTo = (hash: string) => {
@@ -86,21 +88,17 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
     const model = await describe(engines.quick);
     const { reference } = model.page;
     const known = problem ?? (problems.some(({ name }) => name === reference) ? reference : null);
-    const openModel = (read: Uint8Array, text: string) =>
+    const openModel = (read: Uint8Array) =>
       run(async () => {
-        void text;
+        const before = (element as { front?: Front }).front;
         const next = await show(read, null);
-        (element as { front?: Front }).front?.close();
+        const view = before && { y0: before.view.y0, t_span: before.view.t_span, place: "model" };
+        before?.close();
         history.replaceState(null, "", location.href.split("#")[0]);
-        Object.assign(element, { front: next() });
+        Object.assign(element, { front: next(view) });
       });
-    return () =>
-      mount(element, {
-        engine: engines,
-        model,
-        state: fragment.view,
-        host: { ...common, bytes, problem: known, openModel },
-      });
+    const host = { ...common, bytes, problem: known, openModel };
+    return (view = fragment.view) => mount(element, { engine: engines, model, state: view, host });
   };
 
   if (fragment.model) return await show(fragment.model, null);
@@ -113,7 +111,7 @@ async function fromAddress(element: HTMLElement, home: string, run: Open): Promi
   );
 }
 
-async function fromServer(element: HTMLElement, token: string, show: Show): Promise<() => Front> {
+async function fromServer(element: HTMLElement, token: string, show: Show): Promise<Make> {
   const response = await fetch("model", { headers: { "X-Filippov-Token": token } });
   if (response.status !== 200 && response.status !== 204) {
     throw new Error((await response.text()) || `The local server gives no model (${response.status}).`);
@@ -179,6 +177,7 @@ async function render({ model: widget, el }: { model: WidgetModel; el: HTMLEleme
   const sheet = document.createElement("style");
   sheet.textContent = style;
   const element = document.createElement("div");
+  element.setAttribute("data-lm-suppress-shortcuts", "true"); // JupyterLab would take the arrow keys of the sliders
   el.append(sheet, element);
   try {
     const bytes = toBytes(widget.get("model"));

@@ -14,8 +14,8 @@ export interface Context {
   theme(): Theme;
   /** The window of the portrait. */
   window(): { readonly x: readonly [number, number]; readonly y: readonly [number, number] };
-  /** The last state of the run on the screen. */
-  end(): number[] | null;
+  /** The time and the state at the end of the run on the screen. */
+  end(): { readonly t0: number; readonly y0: number[] } | null;
   /** Draw a cycle in the portrait, or take it away. */
   showCycle(run: Run | null): void;
   /** Start the motion elsewhere, as a click in a picture does. */

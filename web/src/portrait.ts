@@ -37,7 +37,9 @@ const CYCLE_WIDTH = 2.4;
 
 /** Draw the portrait; the frame is what a pointer needs. */
 export function drawPortrait(pen: Pen, width: number, height: number, data: PortraitData, theme: Theme): Frame {
-  const entries = keyEntries(data, theme);
+  // the key depends on what rests on the screen, and the frame a little on the height of the key
+  const almost = frameIn(data.box.x, data.box.y, width, height, { ...SIDES, bottom: BELOW_AXIS });
+  const entries = keyEntries(data, almost, theme);
   const key = layKey(pen, entries, width - SIDES.left - SIDES.right);
   const bottom = BELOW_AXIS + key.height;
   const frame = frameIn(data.box.x, data.box.y, width, height, { ...SIDES, bottom });
@@ -248,7 +250,7 @@ function drawMark(pen: Pen, x: number, y: number, theme: Theme): void {
   pen.stroke();
 }
 
-function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
+function keyEntries(data: PortraitData, frame: Frame, theme: Theme): KeyEntry[] {
   const entries: KeyEntry[] = [];
   const { plane, run } = data;
   if (data.withModes && run) entries.push(...modeEntries(modesOf(run), data.surfaces, theme));
@@ -269,14 +271,9 @@ function keyEntries(data: PortraitData, theme: Theme): KeyEntry[] {
     }
   }
   if (data.cycle) entries.push(lineEntry("cycle", cycleColour(theme), CYCLE_WIDTH));
-  if (run && hasDwell(run, data.axes, data.box)) entries.push(dotEntry("at rest, by its duration", theme.muted));
+  if (run && findDwells(run, ...data.axes, frame).length > 0)
+    entries.push(dotEntry("at rest, by its duration", theme.muted));
   return entries;
-}
-
-/** Whether the motion rests at a point, on a screen of usual size. */
-function hasDwell(run: Run, [i, j]: readonly [number, number], box: Box): boolean {
-  const frame = frameIn(box.x, box.y, 500, 500, { left: 0, right: 0, top: 0, bottom: 0 });
-  return findDwells(run, i, j, frame).length > 0;
 }
 
 /** The picture in a sentence. */
