@@ -35,7 +35,7 @@ SEED ?= 0
 WHEEL ?=
 
 .PHONY: help tools setup build build-release sdist check-wheel check-sdist check-crates fmt lint types test test-rs test-py \
-	test-fast test-slow fuzz decisions bench demo pictures figures docs docs-text check all clean
+	test-fast test-slow fuzz decisions bench demo pictures figures app docs docs-text check all clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -125,6 +125,9 @@ pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 
 figures: $(BUILD_STAMP) ## draw the figures of the theory pages and of the first page again
 	$(PY) scripts/theory_figures.py
+
+app: ## the interactive page, into python/filippov/app/static; skips by name what cannot be built here
+	@CARGO="$(CARGO)" sh scripts/build_app.sh
 
 docs-text: $(DOCS_STAMP) ## the documentation without running its code or compiling anything: for work on the text
 	FILIPPOV_DOCS=text NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet

@@ -40,6 +40,7 @@ ROOMS = (
         "locate",
         "tolerances",
         "patience",
+        "powers",
         "clock",
         "stats",
         "vectors",

@@ -17,6 +17,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,8 @@ def on_files(files: Any, config: Any) -> Any:
             files.append(File.generated(config, name, content=content))
     scripts = {job.stem: job for job in jobs if job.suffix == ".py"}
     _add_gallery(files, config, scripts)
+    for name, content in _app_pages().items():
+        files.append(File.generated(config, name, content=content))
     for page in sorted((docs / "tutorial").glob("*.md")):
         content = notebook(page.read_text(encoding="utf-8"))
         files.append(File.generated(config, f"tutorial/{_notebook_name(page.stem)}", content=content))
@@ -168,6 +171,18 @@ def _state_of_the_package() -> str:
     ):
         found.update(path.read_bytes())
     return found.hexdigest()
+
+
+def _app_pages() -> dict[str, bytes]:
+    """Return the interactive pages with their files; where the page was not built, one page that says so."""
+    if TEXT_ONLY:
+        return {"app/problems.md": b"# Explore\n\n(not run)\n"}
+    maker = ROOT / "scripts" / "app_pages.py"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _run([str(maker), name], maker)
+        made = sorted(path for path in folder.rglob("*") if path.is_file())
+        return {f"app/{path.relative_to(folder).as_posix()}": path.read_bytes() for path in made}
 
 
 def _produced(job: Path, docs: Path) -> dict[str, str | bytes]:

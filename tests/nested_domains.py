@@ -1,14 +1,15 @@
-"""Random right-hand sides with roots, logarithms, quotients and quantisers in one another, and quadrature.
+"""Random functions with roots, logarithms, quotients and quantisers in one another, as fields and as events.
 
-Every function is y' = f(t, x) along a line x(t). The oracle knows nothing of the package: it evaluates f with
-NumPy, finds all zeros of what its signs, comparisons and floors read on a fine grid with refinement, and sums
-the integrals between them.
-``python -m nested_domains --n 10000`` runs as many and lists what differs.
+Every function is y' = f(t, x) along a line x(t), or an event f(t, x) - level. The oracle knows nothing of
+the package: it evaluates f with NumPy and finds all zeros of what its signs, comparisons and floors read on a
+fine grid with refinement. Between them it sums the integrals, and looks for changes of sign.
+``python -m nested_domains --n 10000`` runs as many and lists what differs, with ``--events`` as events.
 """
 
 from __future__ import annotations
 
 import random
+import sys
 import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ import filippov as fl
 import numpy as np
 from nestings import METHODS, Outcome, run_many
 
-__all__ = ["check", "made"]
+__all__ = ["check", "check_event", "made"]
 
 END = 4.0
 CELLS = 8192
@@ -177,24 +178,31 @@ _NODES = 0.5 * (1.0 + np.tanh(0.5 * np.pi * np.sinh(_S)))
 _WEIGHTS = (_S[1] - _S[0]) * 0.25 * np.pi * np.cosh(_S) / np.cosh(0.5 * np.pi * np.sinh(_S)) ** 2
 
 
+def along(function: Made, of: Callable[..., Any]) -> Callable[[Any], Any]:
+    """Return a function of the time: `of` along the line."""
+
+    def value(t: Any) -> Any:
+        x = function.start[:, None] + function.velocity[:, None] * t
+        return np.broadcast_to(of(t, x), np.shape(t))
+
+    return value
+
+
+def ends_of_pieces(function: Made) -> Any:
+    """Return the times between which the function is smooth, in order."""
+    ends = {0.0, END}
+    for inner in function.inner:
+        ends.update(places(along(function, inner)))
+    return np.array(sorted(ends))
+
+
 def exact(function: Made) -> float:
     """Return the integral of the function along its line."""
-
-    def along(of: Callable[..., Any]) -> Callable[[Any], Any]:
-        def value(t: Any) -> Any:
-            x = function.start[:, None] + function.velocity[:, None] * t
-            return np.broadcast_to(of(t, x), np.shape(t))
-
-        return value
-
     with np.errstate(all="ignore"):
-        ends = {0.0, END}
-        for inner in function.inner:
-            ends.update(places(along(inner)))
-        knots = np.array(sorted(ends))
+        knots = ends_of_pieces(function)
         widths = np.diff(knots)
         t = knots[:-1, None] + widths[:, None] * _NODES
-        values = along(function.value)(t.ravel()).reshape(t.shape)
+        values = along(function, function.value)(t.ravel()).reshape(t.shape)
         return float(np.sum(widths[:, None] * _WEIGHTS * values))
 
 
@@ -243,5 +251,76 @@ def check(seed: int) -> Outcome:
     return Outcome("different, with a warning" if warned else "different", text)
 
 
+# Times nearer together than this, and values nearer to zero, are left open: rounding decides there.
+_UNCLEAR = 1e-6
+
+
+def changes_of_sign(function: Made, level: float) -> list[float] | None:
+    """Return when f - level changes its sign on the line; None where rounding decides."""
+
+    def value(t: Any) -> Any:
+        return along(function, function.value)(t) - level
+
+    with np.errstate(all="ignore"):
+        knots = np.unique([*ends_of_pieces(function), *places(value)])
+        # Places that are the same up to rounding are one.
+        knots = knots[np.r_[True, np.diff(knots) > 1e-9]]
+        if (np.diff(knots) < _UNCLEAR).any():
+            return None
+        inside = knots[:-1, None] + np.diff(knots)[:, None] * np.array([0.013, 0.26, 0.51, 0.77, 0.987])
+        values = value(inside.ravel()).reshape(inside.shape)
+    signs = np.sign(values)
+    if not np.isfinite(values).all() or (abs(values[:, 1:4]) < 1e-9).any() or (signs != signs[:, :1]).any():
+        return None
+    return [float(t) for t in knots[1:-1][signs[1:, 0] != signs[:-1, 0]]]
+
+
+def check_event(seed: int) -> Outcome:
+    """Compare the zeros of an event with the changes of sign of the function."""
+    function = made(seed)
+    level = float(np.random.default_rng(seed + 1).uniform(-0.3, 0.8))
+    expected = changes_of_sign(function, level)
+    if expected is None:
+        return Outcome("undefined")
+    names: dict[str, Any] = {"np": np}
+    exec(f"def g(t, x):\n    return {function.source} - ({level!r})\n", names)
+    rtol = 10.0 ** -(4 + seed // 4 % 7)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            sol = fl.solve_ivp(
+                lambda t, x: [*function.velocity],
+                (0.0, END),
+                function.start,
+                method=METHODS[seed % 4],
+                rtol=rtol,
+                atol=rtol,
+                events=names["g"],
+                max_wall_time=20.0,
+            )
+        except (fl.TraceError, fl.ModelError, fl.InputError) as refusal:
+            return Outcome("refused", str(refusal).partition("\n")[0][:150])
+    if not sol.success:
+        return Outcome("stopped", sol.message[:200])
+    assert sol.t_events is not None
+    found = sol.t_events[0]
+    warned = [warning.code for warning in sol.warnings]
+    kind = "different, with a warning" if warned else "different"
+    lost = [t for t in expected if not (abs(found - t) < _UNCLEAR).any()]
+    if lost:
+        return Outcome(kind, f"lost {lost} of {expected} with {METHODS[seed % 4]} and {rtol:.0e}; {warned}")
+    # A zero without a change of sign is a touch.
+    near = np.array([t for t in found if not any(abs(t - at) < _UNCLEAR for at in expected)])
+    beside = near[:, None] + 1e-7 * np.array([-1.0, 0.0, 1.0])
+    with np.errstate(all="ignore"):
+        values = along(function, function.value)(beside.ravel()).reshape(beside.shape) - level
+    invented = near[np.nanmin(abs(values), axis=1, initial=np.inf) > 1e-3] if near.size else near
+    if invented.size:
+        return Outcome(kind, f"invented {invented} with {METHODS[seed % 4]} and {rtol:.0e}; {warned}")
+    return Outcome("same")
+
+
 if __name__ == "__main__":
-    run_many(check, __doc__)
+    is_of_events = "--events" in sys.argv
+    sys.argv = [word for word in sys.argv if word != "--events"]
+    run_many(check_event if is_of_events else check, __doc__)

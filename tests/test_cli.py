@@ -170,7 +170,7 @@ def test_the_program_by_itself(model: Path) -> None:
         (["--t", "1", "--dark"], "--dark: needs --plot"),
         (["--t", "1", "--states", "v"], "--states: needs --plot"),
         (["--t", "1", "--phase", "y", "v"], "--phase: needs --plot"),
-        (["--t", "1", "--points", "5"], "--points: needs --csv or --parquet"),
+        (["--t", "1", "--points", "5"], "--points: needs --csv, --json or --parquet"),
         (["--t", "1", "--parquet", "-"], "--parquet: the name of a file is needed"),
     ],
 )

@@ -193,3 +193,22 @@ def test_zeros_behind_a_touch_in_the_same_step(method: str) -> None:
     rising = np.arcsin([0.0, 1 / 3, 2 / 3])
     inside = sol.t_events[0][abs(sol.t_events[0] - np.pi / 2) > 1e-3]
     np.testing.assert_allclose(inside, [*rising, np.pi - rising[2], np.pi - rising[1]], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["Taylor", "DOPRI5", "DOP853", "Rodas5P"])
+@pytest.mark.parametrize(
+    "of", [lambda v: np.exp(v) - 1, np.sin, lambda v: v * (v + 4), lambda v: 1 - np.exp(-v)]
+)
+def test_a_jump_to_the_beginning_of_a_root_is_a_zero(of, method):
+    # A rounding error before the jump the root does not exist.
+    for place in np.linspace(0.3, 1.2, 10):
+        sol = fl.solve_ivp(
+            lambda t, x: [0.7],
+            (0, 3),
+            [-0.2],
+            method=method,
+            rtol=1e-6,
+            events=lambda t, x, a=place: np.sqrt(of(x[0] - a) if of(x[0] - a) > 0 else 0.65) - 0.2,
+        )
+        assert sol.t_events[0][0] == pytest.approx((place + 0.2) / 0.7, abs=1e-9)
+        assert len(sol.t_events[0]) == 2

@@ -152,6 +152,16 @@ def test_clocks_made_of_clocks():
     assert np.allclose(fl.solve_ivp(f, (0, 6), [0.0, 0.0, 0.0]).y[:, -1], [3.0, 2.0, -1.0])
 
 
+@pytest.mark.parametrize("start", [1e6, 1e9, 1e12])
+def test_floors_are_floors_also_where_numbers_are_large(start):
+    sol = fl.solve_ivp(
+        lambda t, x: [np.floor(t) % 2, np.floor(np.floor(t) / 2)], (start, start + 5), [0.0, 0.0]
+    )
+    assert (sol.switches.t - start).tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert sol.y[0, -1] == 2.0
+    assert sol.y[1, -1] == pytest.approx(5 * start / 2 + 4.0, rel=1e-15)
+
+
 def test_the_floor_of_a_parameter_is_a_constant_for_its_value():
     system = fl.System(lambda t, x, p: [np.floor(p) * x[0]], n=1, params={"p": 1.5})
     assert system.solve((0, 1), [1.0]).y[0, -1] == pytest.approx(math.exp(1.0), rel=1e-5)

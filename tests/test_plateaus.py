@@ -368,8 +368,8 @@ def test_a_surface_with_a_root_that_ends_at_another_one(
             assert final(spelling, -2.0, 4.0) == pytest.approx(exact, abs=1e-9)
 
 
-def test_a_surface_with_a_logarithm_that_may_end_at_another_one_is_warned_of() -> None:
-    fun = along_x(lambda x: x * np.log(1 + 2 * np.abs(x)) > np.log(2))
+def test_a_surface_with_an_angle_that_may_end_at_another_one_is_warned_of() -> None:
+    fun = along_x(lambda x: x * np.arccos(1 - np.abs(x)) > 1.0)
     for _ in range(2):  # at every call, also where the trace is kept
         with pytest.warns(fl.FilippovWarning, match="may end where a sign inside of it changes") as caught:
             fl.solve_ivp(fun, (0, 4), [-2.0, 0.0], max_steps=1000)
@@ -378,7 +378,7 @@ def test_a_surface_with_a_logarithm_that_may_end_at_another_one_is_warned_of() -
 
 
 def test_a_system_warns_at_every_solve() -> None:
-    system = fl.System(along_x(lambda x: x * np.log(1 + np.abs(x)) > 0.1), n=2)
+    system = fl.System(along_x(lambda x: x * np.arccos(1 - np.abs(x)) > 0.1), n=2)
     for _ in range(3):
         with pytest.warns(fl.FilippovWarning, match="may end") as caught:
             system.solve((0, 1), [1.0, 0.0])

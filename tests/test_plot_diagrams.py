@@ -101,6 +101,10 @@ def test_basins_have_their_colours_where_they_are() -> None:
     assert (values[:, :3] == 0).all()
     assert (values[:, 3:] == 1).all()
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["attractor 0", "attractor 1"]
-    assert ax.get_xlabel() == "initial_x"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x", "y")
+    attractors = [line.get_xydata()[0] for line in ax.lines]
+    np.testing.assert_allclose(
+        sorted(attractors, key=lambda point: point[0]), [(-1.0, 0.0), (1.0, 0.0)], rtol=0, atol=1e-6
+    )
     with pytest.raises(ValueError, match="two are needed"):
         fl.plot.basins(data.isel(initial_x=0))

@@ -118,3 +118,15 @@ def test_a_root_of_what_is_zero_in_a_region(name: str, direction: float, method:
     places = [-2.0, -0.8, -0.7, -0.6, -0.5, 0.0, 0.1, 0.2, 0.3, 0.8, 1.0, 1.1, 2.0]
     expected = quad(plain, -2.0, 2.0, points=places, limit=400, epsabs=1e-10)[0]
     assert sol.y[1, -1] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("of", [lambda v: v * np.log(1 + abs(v)), lambda v: v * np.log1p(np.abs(v))])
+def test_an_argument_that_stays_clear_of_the_end_of_a_domain_raises_no_doubt(
+    of: Callable[[Any], Any],
+) -> None:
+    place = 1.25
+    level = place * math.log(1 + place)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sol = fl.solve_ivp(lambda t, x: [1.0 if of(x[0]) > level else 0.5], (0, 6), [-0.5])
+    assert sol.switches.t == pytest.approx([1.0, 1.0 + 2 * place], abs=1e-12)

@@ -57,6 +57,7 @@ def report(solution: fl.Solution) -> None:
     print(f"last two periods:           {periods[-2]:.10f}, {periods[-1]:.10f}   (a limit cycle)")
 
 
+@fl.plot.style()
 def draw(solution: fl.Solution, path: Path) -> None:
     """Save the motion over time and in the phase plane."""
     figure, (left, right) = pyplot.subplots(
@@ -70,6 +71,7 @@ def draw(solution: fl.Solution, path: Path) -> None:
     fl.plot.phase(solution, "x", "v", ax=right)
     right.axhline(V_BELT, color="0.7", linewidth=0.8, zorder=0)
     right.set_title("sticking at the speed of the belt", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

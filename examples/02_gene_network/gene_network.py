@@ -52,19 +52,25 @@ def report(solutions: dict[tuple[float, float], fl.Solution]) -> None:
         print(f"production of {name} is on for {share:.12f} of the time  (balance: {decay * OFF / MADE})")
 
 
+@fl.plot.style()
 def draw(solutions: dict[tuple[float, float], fl.Solution], path: Path) -> None:
     """Save the phase plane and the hidden dynamics at the point where the motions end."""
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 4.8), layout="constrained")
-    for level in (ON, OFF):
-        left.axhline(level, color="0.8", linewidth=0.8, zorder=0)
-        left.axvline(level, color="0.8", linewidth=0.8, zorder=0)
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 5.0), layout="constrained")
+    for level, text in ((ON, "on above 4"), (OFF, "off above 8")):
+        left.axhline(level, color="0.7", linewidth=0.8, zorder=0)
+        left.axvline(level, color="0.7", linewidth=0.8, zorder=0)
+        left.text(12.6, level, text, fontsize="small", color="0.4", ha="right", va="bottom")
     for start, solution in solutions.items():
-        fl.plot.phase(solution, "a", "b", ax=left)
+        end = "(8, 8)" if solution.y[0, -1] > ON else "(0, 0)"
+        fl.plot.phase(solution, "a", "b", ax=left, label=f"to {end}; heavy: slides", legend="below")
         left.plot(*start, "o", color="0.3", markersize=3)
-    left.get_legend().remove()
-    left.set_title("sliding is drawn heavier", fontsize="medium")
+    left.plot(OFF, OFF, "*", color="k", markersize=11, zorder=4)
+    left.set(xlim=(0.0, 12.7), ylim=(0.0, 12.7), xlabel="gene a", ylabel="gene b")
+    left.text(8.3, 7.2, "(8, 8): both thresholds", fontsize="small")
     arrival = solutions[6.0, 12.0].switches[-1]
     fl.plot.hidden_dynamics(genes, arrival.t, arrival.y_before, before=arrival.mode_before, ax=right)
+    right.set_title("the arrival at (8, 8), from (6, 12)", pad=24)
+    fl.plot.letters((left, right))
     figure.savefig(path, dpi=150)
 
 

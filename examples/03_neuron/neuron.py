@@ -2,8 +2,8 @@
 
     v' = 0.04 v^2 + 5 v + 140 - u + I,    u' = a (b v - u);    v = 30:  v -> c,  u -> u + d
 
-The parameters decide how the neuron answers a step of the current. The times of all spikes of one pattern
-are compared with those of a run with a tighter tolerance.
+The parameters decide how the neuron answers a step of the current. At each spike the state jumps. The times
+of all spikes of one pattern are compared with those of a run with a tighter tolerance.
 
 Run it with ``python examples/03_neuron/neuron.py [picture.png]``.
 """
@@ -41,20 +41,20 @@ def simulate(name: str, rtol: float = 1e-6) -> fl.Solution:
     return neuron.solve((0.0, 200.0), [-65.0, -65.0 * b], rtol=rtol, atol=rtol)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     figure, axes = pyplot.subplots(len(PATTERNS), 1, figsize=(8.0, 7.2), sharex=True, layout="constrained")
     for name, ax in zip(PATTERNS, axes, strict=True):
         solution = simulate(name)
         spikes = solution.switches.t[solution.switches.kind == "reset"]
         print(f"{name:16s} {len(spikes):3d} spikes, the first at {spikes[0]:.6f} ms")
-        for segment in solution.segments:
-            t = np.linspace(segment.t_start, segment.t_end, 200)
-            v = solution.sol(t)[0]
-            v[-1] = solution.sol(segment.t_end, side="left")[0]
-            ax.plot(t, v, color="C0", linewidth=1.0)
-        ax.set_title(name, fontsize="medium")
-        ax.set_ylabel("v")
-    axes[-1].set_xlabel("t in ms")
+        fl.plot.time_series(solution, states="v", ax=ax, label="v", legend=False, units={"v": "mV"})
+        ax.vlines(spikes, -50.0, 30.0, color="C0", linewidth=0.5, alpha=0.5)
+        ax.axvline(20.0, color="0.5", linewidth=0.8, linestyle="--")
+        ax.set(title=name, xlabel="")
+    axes[0].text(21.0, 20.0, "the current is switched on", fontsize="small", color="0.4")
+    axes[-1].set_xlabel("t [ms]")
+    fl.plot.letters(axes)
     figure.savefig(path, dpi=150)
     coarse, fine = simulate("chattering"), simulate("chattering", 1e-11)
     error = np.abs(coarse.switches.t - fine.switches.t).max()

@@ -38,16 +38,22 @@ def check() -> None:
     print(f"period {np.diff(solution.switches.t[::2])[-1]:.12f}, closed form {on + off:.12f}")
 
 
+@fl.plot.style()
 def draw(path: Path) -> None:
     """Save a picture of two days."""
     solution = room.solve((0.0, 48.0), [15.0], outside=8.0, swing=6.0)
     figure, ax = pyplot.subplots(figsize=(8.0, 3.6), layout="constrained")
-    t = np.linspace(0.0, 48.0, 3000)
-    ax.plot(t, solution.sol(t)[0], linewidth=1.2)
+    fl.plot.time_series(solution, ax=ax, label="room", legend=False)
+    for level in (LOW, HIGH):
+        ax.axhline(level, color="0.6", linestyle="--", linewidth=0.8)
     edges = [0.0, *solution.switches.t, 48.0]
     for start, end in zip(edges[0::2], edges[1::2], strict=False):
         ax.axvspan(start, end, color="C1", alpha=0.15, linewidth=0.0)
-    ax.set(xlabel="t in hours", ylabel="temperature", title="shaded: the heater is on")
+    ax.set(
+        xlabel="t [h]",
+        ylabel="temperature of the room [°C]",
+        title="shaded: the heater is on; dashed: thresholds",
+    )
     figure.savefig(path, dpi=150)
     print(f"{len(solution.switches)} switches in two days")
 

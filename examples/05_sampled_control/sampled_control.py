@@ -37,6 +37,7 @@ def sampled(period: float) -> fl.Solution:
     return fl.solve_ivp(held, (0.0, 10.0), [1.0, 0.0, 0.0], resets=sample, rtol=1e-9, atol=1e-9)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     slides = fl.solve_ivp(ideal, (0.0, 10.0), [1.0, 0.0], rtol=1e-9, atol=1e-9)
     print(f"ideal: reaches s = 0 at t = {slides.switches.t[0]:.9f}, x(10) = {slides.y[0, -1]:.3e}")
@@ -47,12 +48,14 @@ def main(path: Path) -> None:
         s = surface(solution.sol(t))
         band = np.abs(s[t > 5.0]).max()
         print(f"period {period:5.3f}: |s| < {band:.6f} for t > 5, {band / period:.3f} periods")
-        left.plot(t, solution.sol(t)[0], linewidth=1.0, label=f"T = {period}")
+        left.plot(t, solution.sol(t)[0], linewidth=1.0, label=f"sampled, T = {period}")
         right.plot(t, s, linewidth=0.8)
     left.plot(t, slides.sol(t)[0], color="k", linewidth=1.4, label="ideal")
-    left.set(xlabel="t", title="x")
-    right.set(xlabel="t", title="s", ylim=(-0.6, 1.05))
+    right.plot(t, surface(slides.sol(t)), color="k", linewidth=1.4)
+    left.set(xlabel="t", ylabel="x", title="the state")
+    right.set(xlabel="t", ylabel="s = x' + x", title="the switching function", ylim=(-0.6, 1.05))
     left.legend()
+    fl.plot.letters((left, right))
     figure.savefig(path, dpi=150)
 
 

@@ -71,11 +71,17 @@ def diagram(ax, quick: bool) -> None:
     assert phases[[0, -1]].tolist() == [0, 4]
     changes = inverse[np.flatnonzero(np.diff(phases))]
     assert np.allclose(changes, [1.86, 4.82], atol=0.06)  # "near 1.8 and 4.8"
+    ax.vlines(changes, -1.5, 1.5, color="0.6", linestyle="--", linewidth=0.8)
+    ax.text(changes[0] + 0.05, -1.3, "sliding begins", fontsize="small", color="0.4")
+    ax.text(changes[1] + 0.05, -1.3, "two more phases of sliding", fontsize="small", color="0.4")
+    ax.text(1.0, 1.5, "resonance, beyond the frame", fontsize="small", color="0.4", ha="center", va="bottom")
+    ax.set_xlabel(r"$1/\omega$")
     for name, (omega, start, _) in ATTRACTORS.items():
         ax.plot(1 / omega, start[1], "o", markersize=9, markerfacecolor="none", markeredgecolor="k")
         ax.text(1 / omega, start[1] + 0.2, name, ha="center")
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     figure, axes = pyplot.subplots(4, 1, figsize=(8.0, 11.4), layout="constrained")
     diagram(axes[0], quick)
@@ -94,6 +100,7 @@ def main(path: Path, quick: bool) -> None:
         twice = oscillator.solve((0.0, 2 * period), start, omega=omega)
         twice.plot(ax=ax)
         ax.set_title(f"{name}: 1/omega = {1 / omega:g}", loc="left", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -3,10 +3,15 @@
     x' = A x - B sign(x1),    zeta = 0.05, omega = 25
 
 The limit cycle leaves the surface x1 = 0 fourteen times per period. Its period, the point at which it
-leaves after the long phase, and the share of time that it slides are compared with the reference. With
-zeta = -0.07 and omega = 10 the motion goes on and on without the short flights; its switches up to t = 40
-are compared too. The last panel has the maxima of x1 on the attractor over sigma: a period-adding
+leaves after the long phase, and the share of time that it slides are compared with the reference. The last
+panel has the maxima of x1 on the attractor over sigma, for zeta = -0.07 and omega = 25: a period-adding
 sequence.
+
+Figure 6 (b) of the paper shows a chaotic motion. Its text prints zeta = -0.07 and sigma = 10, its caption
+zeta = -0.07 and omega = 10. Both are drawn here, the parameter that is not printed as in figure 5: omega =
+25, and sigma = 1. Neither is chaotic: the first motion comes to an orbit that leaves the surface twice per
+period, the second slowly to one that leaves it four times; both periods are printed. With sigma = 10 and
+omega = 10 together the motion grows without bound.
 
 Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figures 5 and 6.
 Run it with ``python examples/07_relay_feedback/relay_feedback.py [picture.png] [--quick]``.
@@ -41,12 +46,13 @@ def period_adding(ax, quick: bool) -> None:
     )
     assert (maxima.status >= 0).all()
     fl.plot.bifurcation_diagram(maxima, "x1", "sigma", ax=ax)
-    ax.set_ylabel("maxima of x1")
+    ax.set(xlabel=r"$\sigma$", ylabel="maxima of x1")
     periods = maxima.period.sel(sigma=[2.0, 5.0, 10.0], method="nearest").values
     print(f"maxima per period at sigma = 2, 5, 10: {periods}")
     assert periods[2] == 1  # the short orbit of the reference: two departures, one on each side
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     cycle = relay.solve((0.0, PERIOD), [0.0, 1.0, DEPARTURE], **TIGHT)
     sliding = sum(segment.duration for segment in cycle.segments if segment.mode.is_sliding)
@@ -66,20 +72,35 @@ def main(path: Path, quick: bool) -> None:
     print(compare(numbers))
 
     start = relay.solve((0.0, 12.0), [0.0, 0.2, 0.06])
-    window = [(-0.012, 0.012), (-1.6, 1.6), (-2.6, 2.6)]
-    parts = fl.surface_parts(relay, window, points=21)
-    figure = pyplot.figure(figsize=(10.0, 10.0))
-    sides = {"left": 0.09, "right": 0.84, "top": 0.96, "bottom": 0.05}
-    grid = figure.add_gridspec(3, 2, height_ratios=(2.0, 1.0, 1.2), hspace=0.3, **sides)
-    space = fl.plot.phase3d(start, ax=figure.add_subplot(grid[0, 0], projection="3d"))
-    fl.plot.surface(parts, ax=space, legend=False)
-    space.set_title("zeta = 0.05, omega = 25")
-    other = fl.plot.phase3d(slow, ax=figure.add_subplot(grid[0, 1], projection="3d"))
-    other.set_title("zeta = -0.07, omega = 10")
+    fast = relay.solve((0.0, 10.0), [0.0, 0.2, 0.06], zeta=-0.07, sigma=10.0, **TIGHT)
+    for name, values, departures in (("omega", {"omega": 10.0}, 4), ("sigma", {"sigma": 10.0}, 2)):
+        orbit = fl.limit_cycle(relay, [0.0, 0.2, 0.06], {"zeta": -0.07, **values})
+        leaves = sum(
+            0 in a and 0 not in b
+            for a, b in zip(orbit.modes, (*orbit.modes[1:], orbit.modes[0]), strict=True)
+        )
+        print(f"zeta = -0.07, {name} = 10: period {orbit.period:.9f}, {leaves} departures, {orbit!r}")
+        assert (orbit.is_stable, leaves) == (True, departures)
+    figure = pyplot.figure(figsize=(10.0, 9.4), layout="constrained")
+    grid = figure.add_gridspec(3, 3, height_ratios=(1.7, 1.0, 1.1))
+    for place, (motion, title) in enumerate(
+        (
+            (start, r"$\zeta = 0.05,\ \omega = 25,\ \sigma = 1$"),
+            (slow, r"$\zeta = -0.07,\ \omega = 10,\ \sigma = 1$"),
+            (fast, r"$\zeta = -0.07,\ \omega = 25,\ \sigma = 10$"),
+        )
+    ):
+        low, high = motion.y.min(axis=1), motion.y.max(axis=1)
+        space = figure.add_subplot(grid[0, place], projection="3d", computed_zorder=False)
+        values = {"omega": 10.0} if motion is slow else {"sigma": 10.0} if motion is fast else {}
+        window = list(zip(low, high, strict=True))
+        parts = fl.surface_parts(relay, window, points=21, params=values)
+        fl.plot.surface(parts, ax=space, legend=False)
+        fl.plot.phase3d(motion, ax=space, legend=False)
+        space.set_title(title, y=0.96)
     fl.plot.time_series(start, ax=figure.add_subplot(grid[1, :]), states="x1")
-    for ax in figure.axes[:2]:
-        ax.get_legend().remove()
     period_adding(figure.add_subplot(grid[2, :]), quick)
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -29,11 +29,12 @@ CYCLES = {
 }
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
     numbers = {}
     colours = fl.plot.theme().colours
-    heavy = {2: 8.0, 3: 5.0, 5: 2.5}  # the phases of sticking lie on one another
+    moved = {2: 0.0, 3: -0.1, 5: -0.2}  # the phases of sticking lie on one another, at x3 = 0
     for voltage, style, colour in zip(CYCLES, ("-", "--", "-.", ":"), colours, strict=False):
         period, kinds, first = CYCLES[voltage]
         problem = fl.problems.get(f"drill_string_u{voltage}")
@@ -50,13 +51,18 @@ def main(path: Path) -> None:
             for segment in cycle.segments:
                 x = cycle.sol(np.linspace(segment.t_start, min(segment.t_end, period), 401))
                 sticks = segment.mode.is_sliding
-                width = heavy[voltage] if sticks else 1.2
-                ax.plot(x[0], x[2], "-" if sticks else style, color=colour, linewidth=width)
-        left.plot([], [], style, color=colour, label=f"u = {voltage}")
+                down = moved[voltage] if sticks and ax is right else 0.0
+                width = 3.0 if sticks else 1.2
+                ax.plot(x[0], x[2] + down, "-" if sticks else style, color=colour, linewidth=width)
+        number = ("I", "II", "III", "IV")[list(CYCLES).index(voltage)]
+        left.plot([], [], style, color=colour, label=f"{number}: u = {voltage}")
     print(compare(numbers))
     left.legend(frameon=False)
     left.set(xlabel="x1, twist", ylabel="x3, speed of the lower disc")
-    right.set(xlabel="x1", xlim=(-2.5, 2.5), ylim=(-1.0, 2.0), title="sticking is drawn heavier")
+    right.set(
+        xlabel="x1", xlim=(-2.5, 2.5), ylim=(-1.0, 2.0), title="heavy: it sticks at x3 = 0; bars moved apart"
+    )
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

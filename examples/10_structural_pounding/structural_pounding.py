@@ -25,6 +25,7 @@ problem = fl.problems.get("structural_pounding")
 buildings = fl.System(rhs, n=2, states=("y", "v"))
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = buildings.solve(problem.t_span, problem.y0, rtol=1e-12, atol=1e-14)
     # The sign of v matters in contact only: the field does not switch at v = 0 elsewhere.
@@ -41,10 +42,14 @@ def main(path: Path) -> None:
     print(compare(numbers))
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.4, 4.0), layout="constrained")
     for ax in (left, right):
-        fl.plot.phase(solution, ax=ax)
-        ax.axvline(GAP, color="0.6", linestyle="--", linewidth=0.8, zorder=0)
-    left.get_legend().remove()
+        fl.plot.phase(solution, ax=ax, legend=ax is right, units={"y": "m", "v": "m/s"})
+        ax.axvline(GAP, color="0.5", linestyle="--", linewidth=0.8, zorder=0)
+        ax.axhline(0.0, color="0.5", linestyle="--", linewidth=0.8, zorder=0)
+    left.set_title("three seconds of the earthquake; dashed: both surfaces")
+    left.text(GAP, -0.11, "y = 0.005 ", fontsize="small", color="0.4", ha="right", va="bottom")
+    left.text(0.0015, 0.0, "v = 0", fontsize="small", color="0.4", va="bottom")
     right.set(xlim=(0.0046, 0.0058), title="in contact")
+    fl.plot.letters((left, right))
     figure.savefig(path, dpi=150)
 
 

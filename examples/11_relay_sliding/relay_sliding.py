@@ -25,6 +25,7 @@ problem = fl.problems.get("relay_feedback")
 relay = fl.System(rhs, n=3, args=problem.args, states=("y1", "y2", "y3"))
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = relay.solve(problem.t_span, problem.y0, rtol=1e-12, atol=1e-12)
     phases = [segment for segment in solution.segments if segment.mode.is_sliding]
@@ -42,11 +43,12 @@ def main(path: Path) -> None:
     print(f"{len(phases)} phases of sliding, the shortest lasts {min(p.duration for p in phases):.5f}")
     print(compare(numbers))
     figure = pyplot.figure(figsize=(10.4, 4.6))
-    grid = figure.add_gridspec(1, 2, left=0.02, right=0.84, bottom=0.12, top=0.95, wspace=0.25)
+    grid = figure.add_gridspec(1, 2, left=0.02, right=0.78, bottom=0.12, top=0.95, wspace=0.25)
     space = fl.plot.phase3d(solution, ax=figure.add_subplot(grid[0], projection="3d"))
     space.get_legend().remove()
     fl.plot.phase(solution, "y1", "y3", ax=figure.add_subplot(grid[1]))
     space.set_yticks(np.arange(-1.0, 1.1))
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

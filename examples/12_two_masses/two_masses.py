@@ -24,6 +24,7 @@ problem = fl.problems.get("two_masses")
 masses = fl.System(rhs, n=4, states=("y1", "y2", "v1", "v2"))
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = masses.solve(problem.t_span, problem.y0, rtol=1e-12, atol=1e-12)
     switches = solution.switches
@@ -42,8 +43,9 @@ def main(path: Path) -> None:
     fl.plot.time_series(solution, ax=top, states=("y1", "y2"))
     fl.plot.time_series(solution, ax=bottom, states=("v1", "v2"))
     bottom.get_legend().remove()
-    top.set(xlabel="", ylabel="positions: y1, y2 dashed")
-    bottom.set(ylabel="speeds: v1, v2 dashed")
+    top.set(xlabel="", ylabel="positions (y2 dashed)")
+    bottom.set(ylabel="speeds (v2 dashed)")
+    fl.plot.letters((top, bottom))
     figure.savefig(path, dpi=150)
 
 

@@ -25,6 +25,7 @@ PERIOD = 9.230770458082979
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     cycle = block.solve((0.0, 1.01 * PERIOD), [1.0, 0.2], **TIGHT)
     outside = block.solve((0.0, 30.0), [3.0, 2.0], **TIGHT)
@@ -40,13 +41,22 @@ def main(path: Path) -> None:
         "from outside: x1(30)": (outside.y[0, -1], 0.63428351405460679),
     }
     print(compare(numbers))
-    parts = fl.surface_parts(block, [(-3.2, 3.8), (-1.0, 1.0)], points=201)
     figure, axes = pyplot.subplots(1, 2, figsize=(11.4, 4.2), layout="constrained")
-    for ax, solution, title in zip(axes, (cycle, outside), ("the cycle", "from outside"), strict=True):
-        fl.plot.phase(solution, ax=ax)
-        fl.plot.surface(parts, ax=ax)
+    for ax, solution, title, half in zip(
+        axes, (cycle, outside), ("the cycle", "from outside"), (1.6, 3.8), strict=True
+    ):
+        fl.plot.surface(
+            fl.surface_parts(block, [(-half, half), (-1.0, 1.0)], points=201), ax=ax, legend=False
+        )
+        fl.plot.phase(solution, ax=ax, legend=ax is axes[1])
+        ax.plot(*release.y_before, "D", color="k", markerfacecolor="w", zorder=4)
         ax.set_title(title)
-    axes[0].get_legend().remove()
+    axes[0].text(1.0, 0.23, "lets go, x1 = 1", fontsize="small", ha="center")
+    axes[0].text(stick.y_after[0], 0.23, "sticks", fontsize="small", ha="center")
+    axes[0].set(xlim=(-1.6, 1.6), ylim=(-0.62, 0.34))
+    axes[1].plot(*outside.y[:, 0], "o", color="k", markersize=5, zorder=4)
+    axes[1].text(2.85, 2.1, "start", fontsize="small", ha="right")
+    fl.plot.letters(axes)
     figure.savefig(path, dpi=150)
 
 

@@ -36,6 +36,7 @@ RUNS = {
 }
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     figure = pyplot.figure(figsize=(11.0, 4.8))
     for place, (start, (one, both, last)) in enumerate(RUNS.items()):
@@ -47,14 +48,18 @@ def main(path: Path) -> None:
         }
         print(f"from {start}: {' -> '.join(str(segment.mode) for segment in solution.segments)}")
         print(compare(numbers), end="\n\n")
-        ax = fl.plot.phase3d(solution, ax=figure.add_subplot(1, 2, place + 1, projection="3d"))
+        # The surfaces are drawn first, and stay behind the motion.
+        ax = figure.add_subplot(1, 2, place + 1, projection="3d", computed_zorder=False)
         low, high = solution.y.min(axis=1) - 0.2, solution.y.max(axis=1) + 0.2
         for surface in range(2):
             parts = fl.surface_parts(system, list(zip(low, high, strict=True)), surface, points=33)
             fl.plot.surface(parts, ax=ax, legend=False)
+        fl.plot.phase3d(solution, ax=ax)
+        ax.plot(*start, "o", color="k", markersize=5)
         ax.view_init(elev=25.0, azim=-35.0)
         ax.get_legend().set(loc="upper left", bbox_to_anchor=(-0.08, 1.0))
         ax.set_title(("the quadric first", "the plane first")[place])
+    fl.plot.letters(figure.axes)
     figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06, top=0.92)
     figure.savefig(path, dpi=150)
 

@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 import filippov as fl
+import numpy as np
 from filippov.problems import compare
 from filippov.problems.dieci_lopez import example_6_4
 from matplotlib import pyplot
@@ -27,6 +28,7 @@ PERIOD, DEPARTURE = 9.62217612301998474, (0.0, 1.0, 1.42040902228812303, 0.23576
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     cycle = slides.solve((0.0, PERIOD), DEPARTURE, **TIGHT)
     fast = chatters.solve((0.0, 13.0), START, **TIGHT)
@@ -44,12 +46,22 @@ def main(path: Path) -> None:
     figure = pyplot.figure(figsize=(11.0, 8.0))
     grid = figure.add_gridspec(2, 2, left=0.02, right=0.85, bottom=0.07, top=0.95, width_ratios=(1.0, 1.3))
     for row, (solution, title) in enumerate(
-        ((slides.solve((0.0, 40.0), START), "(i)"), (chatters.solve((0.0, 13.0), START), "(ii)"))
+        (
+            (slides.solve((0.0, 40.0), START), "(i) slides"),
+            (chatters.solve((0.0, 13.0), START), "(ii) chatters"),
+        )
     ):
-        ax = fl.plot.phase3d(solution, ax=figure.add_subplot(grid[row, 0], projection="3d"))
-        ax.get_legend().remove()
-        ax.set_title(title)
-        fl.plot.time_series(solution, ax=figure.add_subplot(grid[row, 1]), states=("x1", "x2"))
+        space = figure.add_subplot(grid[row, 0], projection="3d")
+        fl.plot.phase3d(solution, ax=space, legend=False)
+        space.set_title(title)
+        over_time = fl.plot.time_series(solution, ax=figure.add_subplot(grid[row, 1]), states=("x1", "x2"))
+    # The chattering, enlarged: x1 swings across the surface ever faster.
+    enlarged = over_time.inset_axes((0.42, 0.14, 0.55, 0.36))
+    fl.plot.time_series(fast, ax=enlarged, states="x1", legend=False, strip=False)
+    swing = 1.2 * np.abs(fast.sol(np.linspace(2.5, 3.0, 2000))[0]).max()
+    enlarged.set(xlim=(2.5, 3.0), ylim=(-swing, swing), xlabel="", ylabel="x1", title="enlarged")
+    over_time.indicate_inset_zoom(enlarged, edgecolor="0.4")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -85,6 +85,7 @@ def period_doubling(ax, quick: bool) -> None:
     assert 24.0 < doubled < 25.0  # 24.5 V in the literature
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     instant, state = periodic_motion(20.0)
     solution = late(20.0, 5)
@@ -101,12 +102,12 @@ def main(path: Path, quick: bool) -> None:
         run = late(E, periods)
         ticks = np.unique(run.sol(PERIOD * np.arange(periods))[0].round(6))
         print(f"E = {E:g} V: {len(ticks)} different voltages at {periods} ticks")
-        fl.plot.phase(run, "v", "i", ax=ax)
-        ax.get_legend().remove()
+        fl.plot.phase(run, "v", "i", ax=ax, legend=False, units={"v": "V", "i": "A"})
         ax.set_title(f"E = {E:g} V")
         for line in ax.lines:
             line.set_linewidth(0.8)
     period_doubling(bottom, quick)
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

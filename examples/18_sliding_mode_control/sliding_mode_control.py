@@ -26,6 +26,7 @@ control = fl.problems.get("sliding_mode_control").system()
 STRENGTH, RATE = 2.0, 1.5
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = control.solve((0.0, 8.0), [1.0, 0.0], rtol=1e-11, atol=1e-13)
     (reached,) = solution.switches
@@ -48,9 +49,11 @@ def main(path: Path) -> None:
     t = np.linspace(reached.t, 8.0, 600)
     seen = STRENGTH * solution.sol.multipliers(t)[0] - RATE * solution.sol(t)[1]
     top.plot(t, seen, color="0.5", linewidth=1.0, linestyle="--")
+    top.set(title="strong enough: the controller slides on s = 0 from then on", xlabel="")
     top.text(3.9, 0.86, "disturbance, from the multiplier", fontsize="small", ha="center")
     weak.plot(ax=bottom)
-    bottom.set_title("K = 0.75 is too weak", loc="left", fontsize="medium")
+    bottom.set_title("K = 0.75 is too weak")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -26,6 +26,7 @@ problem = fl.problems.get("friction_chain")
 SPEED = 0.1
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     chain = problem.system()
     solution = chain.solve(problem.t_span, problem.y0, rtol=1e-10, atol=1e-10)
@@ -56,6 +57,7 @@ def main(path: Path) -> None:
     top.set_ylabel("position")
     top.legend(frameon=False)
     bottom.set(xlabel="t", ylabel="block", yticks=range(1, BLOCKS + 1), title="bars: it sticks")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

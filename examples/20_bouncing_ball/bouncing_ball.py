@@ -41,6 +41,7 @@ hit = fl.Reset(
 shaken = fl.System(lambda t, x: [x[1], -GRAVITY], n=2, states=("y", "v"), resets=hit)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = fl.problems.get("bouncing_ball").solve()
     impacts = solution.switches.t[solution.switches.kind == "reset"]
@@ -63,9 +64,11 @@ def main(path: Path) -> None:
     figure, (top, bottom) = pyplot.subplots(2, 1, figsize=(8.4, 6.0), layout="constrained")
     fl.plot.time_series(solution, ax=top, states="y")
     fl.plot.time_series(thrown, ax=bottom, states="y")
+    top.set(title="the impacts accumulate, and the ball lies still", xlabel="")
     t = np.linspace(0.0, 4.0, 2000)
     bottom.plot(t, table(t), color="0.6", linewidth=0.8, zorder=0)
-    bottom.set_title("on a table that shakes", loc="left", fontsize="medium")
+    bottom.set_title("on a table that shakes (grey)")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

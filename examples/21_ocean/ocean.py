@@ -49,6 +49,7 @@ def time_to_border(start: np.ndarray, k: float, eps: float) -> float:
     return middle
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     eps = -0.01
     solution = ocean.solve((0.0, 60.0), [0.5, 0.2], rtol=1e-11, atol=1e-12)
@@ -69,7 +70,7 @@ def main(path: Path) -> None:
     (k,) = (root.real for root in roots if 0.0 < root.real < MIXING)
     numbers["mean mixing at rest, eps = 0.1"] = (0.5 * MIXING * (1.0 + calm.sol.multipliers(60.0)[0]), k)
     print(compare(numbers))
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
+    figure, (left, loop, right) = pyplot.subplots(1, 3, figsize=(13.4, 4.2), layout="constrained")
     for ax, run, value in ((left, solution, eps), (right, calm, 0.1)):
         fl.plot.phase(run, "T", "S", ax=ax)
         parts = fl.surface_parts(ocean, [(0.1, 1.05), (-0.1, 1.05)], points=201, params={"eps": value})
@@ -77,6 +78,15 @@ def main(path: Path) -> None:
         ax.set(xlim=(0.3, 1.05), ylim=(0.1, 1.0), title=f"eps = {value}")
     for ax in (left, right):
         ax.get_legend().set(loc="upper left", bbox_to_anchor=(0.0, 1.0))
+    # The loop is thin: over the density it opens.
+    colours = fl.plot.theme().colours
+    for segment in solution.segments[solution.segments.t_start > 20.0]:
+        T, S = solution.sol(np.linspace(segment.t_start, segment.t_end, 400)[1:-1])
+        loop.plot(T, S - ALPHA * T, color=colours[0 if segment.mode[0] > 0 else 1])
+    loop.axhline(eps, color=fl.plot.theme().crossing, linestyle=":", zorder=1)
+    loop.text(0.665, eps, "mixing sets in above eps", fontsize="small", color="0.4", ha="center", va="top")
+    loop.set(xlabel="T", ylabel="density, S - 0.8 T", title="the oscillation in (a), over the density")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

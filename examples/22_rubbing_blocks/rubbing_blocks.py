@@ -27,6 +27,7 @@ problem = fl.problems.get("rubbing_blocks")
 CONTACTS = ("1 | floor", "2 | floor", "3 | floor", "1 | 2", "2 | 3")
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = problem.system().solve(problem.t_span, problem.y0, rtol=1e-10, atol=1e-10)
     t = np.linspace(*problem.t_span, 4001)
@@ -66,6 +67,7 @@ def main(path: Path) -> None:
     bottom.set(
         xlabel="t", ylabel="share in use", ylim=(-1.1, 1.1), title="friction of the contacts that stick"
     )
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -43,6 +43,7 @@ def rectifier(t, state):
     return [*rates, (sum(currents) - u / LOAD) / CAPACITANCE, given, heat]
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = rectifier.solve((0.0, 0.08), np.zeros(PHASES + 3), rtol=1e-10, atol=1e-10)
     t = np.linspace(*solution.t[[0, -1]], 4001)
@@ -75,6 +76,7 @@ def main(path: Path) -> None:
     bottom.set(xlabel="t (ms)", ylabel="current (A)")
     for axes, columns in ((top, 1), (bottom, PHASES)):
         axes.legend(frameon=False, ncols=columns, loc="upper right")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

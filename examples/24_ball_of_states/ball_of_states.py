@@ -44,6 +44,7 @@ def carried(radius: float, times: np.ndarray) -> np.ndarray:
     return np.array([friction.solve((0.0, END), start, **TIGHT).sol(times) - centre for start in starts.T])
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     sol = friction.solve((0.0, END), CENTRE, wrt="y0", **TIGHT)
     crossing = sol.switches[0]

@@ -86,6 +86,7 @@ def error_of_jacobian(p: np.ndarray) -> float:
     return (np.abs(np.transpose(found) - exact) / np.abs(exact).max(axis=0)).max()
 
 
+@fl.plot.style()
 def draw(path: Path, measured: np.ndarray, p: np.ndarray, covariance: np.ndarray, quantile: float) -> None:
     panels = [["record", "law"], ["residuals", "law"], ["part", "width"]]
     ratios = {"width_ratios": (1.6, 1.0), "height_ratios": (2.0, 1.0, 2.0)}
@@ -123,6 +124,7 @@ def draw(path: Path, measured: np.ndarray, p: np.ndarray, covariance: np.ndarray
     axes["part"].set_xlabel("t in s")
     for name in ("record", "part", "law"):
         axes[name].legend(fontsize="small")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

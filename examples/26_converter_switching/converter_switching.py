@@ -83,6 +83,7 @@ def differences(instants: np.ndarray, step: float = 1e-3) -> np.ndarray:
     return (np.array(above) - below) / (2 * step)
 
 
+@fl.plot.style()
 def draw(path: Path, best: np.ndarray, costs: list[float], gradients: list[np.ndarray]) -> None:
     panels = [["voltage", "costs"], ["current", "gradient"], ["duty", "gradient"]]
     ratios = {"width_ratios": (1.6, 1.0), "height_ratios": (2.0, 2.0, 1.3)}
@@ -109,6 +110,7 @@ def draw(path: Path, best: np.ndarray, costs: list[float], gradients: list[np.nd
     axes["gradient"].plot(numbers, 1e3 * gradients[1], "x", color="k", markersize=9, label="differences")
     axes["gradient"].set(xlabel="number of the instant", ylabel="gradient of the cost at the start in 1/ms")
     axes["gradient"].legend()
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -85,6 +85,7 @@ def costs_around(strengths: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     return (ends[2] + terminal(T_SPAN[1], ends)).reshape(K.shape)
 
 
+@fl.plot.style()
 def draw(path: Path, descents: dict[str, np.ndarray], best: np.ndarray) -> None:
     panels = [["gains", "position"], ["gains", "force"]]
     figure, axes = pyplot.subplot_mosaic(panels, figsize=(11.0, 6.0), layout="constrained")
@@ -110,6 +111,7 @@ def draw(path: Path, descents: dict[str, np.ndarray], best: np.ndarray) -> None:
     axes["force"].set_title("force; while the motion slides, its mean", fontsize="medium")
     axes["force"].set(xlabel="t in s", ylabel="force of the relay in N")
     axes["position"].legend(fontsize="small")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

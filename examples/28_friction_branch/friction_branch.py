@@ -66,6 +66,7 @@ def draw_curves(ax, curves: dict[str, fl.Branch]) -> None:
         ax.text(x, y, text)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     start = fl.limit_cycle(oscillator, [1.0, 2.0])
     branch = fl.continuation(start, "omega", (1 / 7, 0.99), monitor=inverse)
@@ -107,6 +108,7 @@ def main(path: Path) -> None:
     axes["branch"].text(1.05, -1.4, "resonance")
     draw_cycles([axes[name] for name in "abc"], branch)
     draw_curves(axes["curves"], curves)
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -100,6 +100,7 @@ def cycles() -> tuple[fl.Branch, dict[str, tuple[float, float]]]:
     return branch, {f"cycle, {code}": (found[code], CYCLE[code]) for code in CYCLE}
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     rests, numbers = equilibria()
     branch, of_cycle = cycles()
@@ -124,6 +125,7 @@ def main(path: Path) -> None:
     cycle = branch.at(alpha=0.5)
     fl.plot.portrait(harvest, window, cycle.params, ax=weak_axes, cycles=[cycle], **look)
     weak_axes.set_title("e = 0.1, alpha = 0.5: a cycle that slides", fontsize="medium")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -131,6 +131,7 @@ def draw_cycles(ax, cycles: dict[str, fl.Cycle]) -> None:
     ax.legend(fontsize="small", frameon=False, loc="upper right")
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     branch, curve = fold_and_grazing()
     found = doublings()
@@ -154,6 +155,7 @@ def main(path: Path) -> None:
     axes[1, 1].set_title("s = 0: periods of 1, 2 and 4 forcings", fontsize="medium")
     for ax in (axes[0, 0], axes[1, 1]):
         ax.get_legend().remove()
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

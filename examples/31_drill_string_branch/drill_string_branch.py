@@ -80,6 +80,7 @@ def draw_cycle(ax, cycle: fl.Cycle, text: str) -> None:
     ax.set_title(f"u = {cycle.params['u']:g}: {text}", fontsize="medium")
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     rests, cycles = branches()
     panels = [["fastest"] * 2 + ["slowest"] * 2, list(SHOWN)]
@@ -94,6 +95,7 @@ def main(path: Path) -> None:
     axes["slowest"].text(1.9, 2.3, "equilibrium")
     for u, text in SHOWN.items():
         draw_cycle(axes[u], cycles.at(u=u), text)
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -89,6 +89,7 @@ def cascade(count: int) -> list[fl.Branch]:
     return found
 
 
+@fl.plot.style()
 def main(path: Path, quick: bool) -> None:
     branches = cascade(3 if quick else 6)
     E = [branch.special["PD"][0].params["E"] for branch in branches]
@@ -118,6 +119,7 @@ def main(path: Path, quick: bool) -> None:
         ax.set(xlabel="E in V", ylabel="v at the ticks in V")
     axes[0].set(xlim=(20.0, 33.0), ylim=(11.7, 12.6))
     axes[1].set(xlim=(30.5, 33.0), ylim=(11.9, 12.5))
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

@@ -100,6 +100,7 @@ def damped() -> tuple[list[fl.Branch], list[fl.Branch]]:
     return [rests, sticks, slips], curves
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     friction = undamped()
     branches, curves = damped()
@@ -124,6 +125,7 @@ def main(path: Path) -> None:
     for ax, place in ((over_speed, "upper left"), (plane, "upper right")):
         handles = [line for line in ax.get_legend().legend_handles if "flow" not in line.get_label()]
         ax.legend(handles=handles, loc=place, frameon=False, fontsize="small")
+    fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 
 

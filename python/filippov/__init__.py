@@ -40,7 +40,7 @@ from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchT
 from filippov.system import System
 
 if TYPE_CHECKING:
-    from filippov import analysis, cycles, plot, problems
+    from filippov import analysis, app, cycles, plot, problems
     from filippov.analysis import (
         Phase,
         Section,
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         poincare,
         sweep,
     )
+    from filippov.app import explore
     from filippov.cycles import (
         Branch,
         Cycle,
@@ -103,12 +104,14 @@ __all__ = [
     "ToleranceError",
     "TraceError",
     "analysis",
+    "app",
     "basins",
     "bifurcation_diagram",
     "continuation",
     "cycles",
     "equilibria",
     "equilibrium",
+    "explore",
     "gradient",
     "hidden_dynamics",
     "hysteresis",
@@ -129,7 +132,7 @@ __all__ = [
     "system",
 ]
 
-_LAZY = ("analysis", "cycles", "plot", "problems")
+_LAZY = ("analysis", "app", "cycles", "plot", "problems")
 _LAZY_NAMES = {
     "HiddenDynamics": "hidden",
     "hidden_dynamics": "hidden",
@@ -139,6 +142,7 @@ _LAZY_NAMES = {
     **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
     **dict.fromkeys(("continuation", "equilibrium", "limit_cycle", "manifold"), "cycles"),
     "equilibria": "cycles.box",
+    "explore": "app",
     "lyapunov": "cycles.exponents",
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",

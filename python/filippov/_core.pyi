@@ -13,6 +13,7 @@ __all__ = [
     "ManualClock",
     "ModeBounds",
     "OpaqueSystem",
+    "PageModel",
     "Regions",
     "Run",
     "RunOptions",
@@ -20,11 +21,14 @@ __all__ = [
     "TracedEvent",
     "TracedSystem",
     "__version__",
+    "answer_page",
     "classify",
     "growth_many",
     "hidden_dynamics",
     "intersection_field",
     "load_system",
+    "pack_page",
+    "page_of",
     "replay_decision",
     "save_system",
     "solve",
@@ -384,6 +388,28 @@ def load_system(
     list[float] | None,
     list[tuple[str, list[float], TracedSystem | None, str]],
 ]: ...
+
+@final
+class PageModel:
+    def __new__(cls, data: bytes) -> Self: ...
+    @staticmethod
+    def of_calls(
+        make: Callable[
+            [list[float], float, list[float]],
+            tuple[TracedSystem | OpaqueSystem | SignedSystem, Sequence[tuple[str, list[float], Any, str]]],
+        ],
+        states: Sequence[str],
+        params: dict[str, float],
+        surfaces: Sequence[str],
+        page: str,
+        actions: Sequence[str] = ...,
+        discrete: Sequence[str] = ...,
+    ) -> PageModel: ...
+    def answer(self, request: bytes) -> bytes: ...
+
+def answer_page(model: PageModel, request: bytes) -> bytes: ...
+def pack_page(system: bytes, page: str) -> bytes: ...
+def page_of(data: bytes) -> str | None: ...
 def classify(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t: float,

@@ -21,6 +21,7 @@ from filippov.notices import show_summary
 from filippov.options import OPTIONS, check_options, check_t_span, in_order
 from filippov.outputs import at_ends, refuse_outputs_that_fail
 from filippov.prepare import Prepared
+from filippov.progress import Progress, report_of_members
 from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
 from filippov.switches import NO_DERIVATIVES, derivative_warnings
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from filippov.system import System
 
 Array = npt.NDArray[np.float64]
+
+# Parts of an ensemble that is watched: the failures of a part are counted when it is done.
+_PARTS = 50
 
 
 class Ensemble(Sequence[Solution]):
@@ -238,7 +242,9 @@ def run_ensemble(
     states, values = _members(system, y0, params)
     n = states.shape[1]
     names = system.state_names(n)
-    checked = check_options({"keep": "last", **_known(options, system)}, (t0, t1), n)
+    known = _known(options, system)
+    progress = Progress(known.pop("progress", None), len(states), unit="runs")
+    checked = check_options({"keep": "last", **known}, (t0, t1), n)
     wanted = None if wrt is None else check_wrt(wrt, names, values, system.discrete)
     n_threads = min(check_threads(threads), len(states))
     specs = normalise_events(events)
@@ -250,14 +256,15 @@ def run_ensemble(
             refuse_without_derivatives(group.prepared, (t0, t1))
     runs: list[Run] = []
     raised: BaseException | None = None
-    for group in groups:
+    for group, members in _in_parts(groups, len(states), n_threads, progress.is_wanted):
+        report = report_of_members(progress, len(runs)) if progress.is_wanted else None
         done, raised = solve_many(
             group.prepared.core,
             t0,
             t1,
-            np.ascontiguousarray(states[group.members]),
-            np.ascontiguousarray(table[group.members], dtype=float),
-            checked.for_core(),
+            np.ascontiguousarray(states[members]),
+            np.ascontiguousarray(table[members], dtype=float),
+            checked._replace(progress=report).for_core(),
             group.events,
             list(group.prepared.actions),
             n_threads,
@@ -266,6 +273,8 @@ def run_ensemble(
         runs += done
         if raised is not None:
             break
+        progress.add(len(done), sum(run.status < 0 for run in done))
+    progress.close()
     ensemble = Ensemble(
         runs,
         system,
@@ -289,6 +298,17 @@ def run_ensemble(
     if ensemble.n_warnings.any():
         _show_warnings(ensemble)
     return ensemble
+
+
+def _in_parts(
+    groups: Sequence[_Group], count: int, n_threads: int, is_watched: bool
+) -> Iterator[tuple[_Group, slice]]:
+    """Yield the groups, in parts small enough for a bar where one is wanted."""
+    for group in groups:
+        start, stop, _ = group.members.indices(count)
+        size = max(n_threads, -(-count // _PARTS)) if is_watched else stop - start
+        for first in range(start, stop, size):
+            yield group, slice(first, min(first + size, stop))
 
 
 def _show_warnings(ensemble: Ensemble) -> None:
@@ -339,9 +359,8 @@ def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
     for name in ("fun", "surfaces", "args", "resets"):
         if options.get(name) is not None:
             raise InputError(f"{name}: belongs to the System; pass it to fl.System, not to the ensemble")
-    for name in ("nonunique", "progress"):
-        if options.get(name) in ("branch", True) or callable(options.get(name)):
-            raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
+    if options.get("nonunique") == "branch":
+        raise InputError("nonunique: 'branch' is not for an ensemble")
     known = set(inspect.signature(solve_ivp).parameters) - {"unknown"}
     unknown = {name: value for name, value in options.items() if name not in known}
     system.refuse_undeclared(unknown)

@@ -387,6 +387,8 @@ def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None
         return None
     if progress is True:
         return Report(print_progress(t_span))
+    if isinstance(progress, Report):
+        return progress
     if callable(progress):
         return Report(progress)
     raise InputError("progress: True, False, or a function of the time reached, is needed")

@@ -144,6 +144,7 @@ _FIELDS = (
     "sol",
     "t_events",
     "y_events",
+    "event_names",
     "nfev",
     "njev",
     "nlu",
@@ -191,6 +192,8 @@ class Solution:
         The solution as a function, ``sol.sol(t, side="right")``; ``None`` if ``dense_output=False``.
     t_events, y_events : list of ndarray or None
         Times, shape (k,), and states, shape (k, n), of every event given; ``None`` if none was given.
+    event_names : tuple of str
+        Names of the events.
     nfev, njev, nlu : int
         Numbers of evaluations of the field, those for Jacobians by differences included, of Jacobians, and
         of factorisations; the last two are 0 unless ``method="Rodas5P"`` took steps.
@@ -316,6 +319,14 @@ class Solution:
             return None
         # SciPy's shape: (k, n), and (0,) where there is none.
         return [y if len(y) else np.empty(0) for y in self._run.y_events]
+
+    @cached_property
+    def event_names(self) -> tuple[str, ...]:
+        """The names of the events, in the order of `t_events`; ``event 0`` and so on for those without."""
+        if not self._origin.has_events:
+            return ()
+        names = [spec.name for spec in self._origin.events] or ["event"] * len(self._run.t_events)
+        return tuple(f"event {k}" if name == "event" else name for k, name in enumerate(names))
 
     @cached_property
     def nfev(self) -> int:
@@ -847,7 +858,7 @@ class Solution:
         cells = (f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, _, text in rows)
         return f"<table>{''.join(cells)}</table>"
 
-    def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
+    def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None, **options: Any) -> Any:
         """Draw the states over time, coloured by mode; see `filippov.plot.time_series`.
 
         Parameters
@@ -858,10 +869,12 @@ class Solution:
             Which states and outputs; all states by default.
         dark : bool, optional
             Light lines on a dark ground; by default as `filippov.plot.style` around says.
+        **options
+            `layout`, `legend`, `label`, `strip`, `units` of `filippov.plot.time_series`.
 
         Returns
         -------
-        matplotlib.axes.Axes
+        matplotlib.axes.Axes, or ndarray of these
 
         Raises
         ------
@@ -870,7 +883,7 @@ class Solution:
         """
         from filippov.plot import time_series
 
-        return time_series(self, ax=ax, states=states, dark=dark)
+        return time_series(self, ax=ax, states=states, dark=dark, **options)
 
     def __repr__(self) -> str:
         n_sliding = sum(mode.is_sliding for mode in self.segments.mode)

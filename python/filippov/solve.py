@@ -383,7 +383,7 @@ def _solve(
                     run, used = beyond, ended
         has_events = specs is not None
         solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
-        if wanted is not None:
+        if specs or wanted is not None:
             solution._origin = solution._origin._replace(events=tuple(specs or ()), args=constants)
         return solution
 
@@ -438,6 +438,7 @@ def _report_end(report: Report, run: AnyRun, solution: Solution) -> None:
     if report.error is None and run.reason != "interrupted" and len(run.t):
         with suppress(BaseException):
             report(float(run.t[-1]))
+    report.close()
     error: Any = report.error
     if isinstance(error, KeyboardInterrupt):
         raise Interrupted(run.message or "interrupted", partial=solution) from error

@@ -368,8 +368,9 @@ class System(Points, Saving):
         threads : int, optional
             Number of threads; by default one per core. The results do not depend on it, to the bit.
         **options
-            Options of `solve_ivp`; `keep` is ``"last"`` by default. With `wrt`, `Ensemble.derivative` has the
-            derivatives of all members.
+            Options of `solve_ivp`; `keep` is ``"last"`` by default. ``progress`` is a bar, or a function of
+            the number of runs done, of all, and of those that failed. With `wrt`, `Ensemble.derivative` has
+            the derivatives of all members.
 
         Returns
         -------

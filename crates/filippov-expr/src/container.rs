@@ -236,6 +236,16 @@ impl<'a> Container<'a> {
         }
     }
 
+    /// The next section if it has this tag; `None`, and nothing is read, if it has another one or there is none.
+    pub fn optional(&mut self, tag: Tag) -> Option<Section<'a>> {
+        let is_next = self.sections.as_slice().first()?.tag == tag;
+        if is_next {
+            self.sections.next()
+        } else {
+            None
+        }
+    }
+
     /// Says that all sections were read.
     ///
     /// # Errors

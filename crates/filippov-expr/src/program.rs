@@ -114,6 +114,7 @@ impl Program {
     /// As [`Program::eval`], if this is native code and no argument is too short; else it does nothing and returns
     /// `false`. For a caller that keeps everything else away from its fastest way.
     #[inline]
+    #[cfg_attr(not(feature = "native"), allow(unused_variables))]
     pub fn eval_native(
         &self,
         t: f64,

@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use filippov::action::Actions;
 use filippov::derivative::{Exponents, Extension, Growth};
-use filippov::{Options, Problem, Solution, Stop};
+use filippov::{message_of, Options, Problem, Solution, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 
 use crate::derivatives::Failure;
 use crate::prepared_run::{ActionRow, PreparedRun};
-use crate::run::{is_interruption, message_of, status_of, take_error};
+use crate::run::{is_interruption, take_error};
 use crate::solve::RunOptions;
 use crate::systems::TracedSystem;
-use crate::threads::{on_threads, CHUNK_PER_THREAD};
+use crate::threads::{on_threads, Report, CHUNK_PER_THREAD};
 
 /// Status, reason, message and last time of a run; the times at which the growth is known, the logarithms of the growth at each of
 /// them, and how many directions are gone; the time from which on it is not known, with the reason; and the kinds
@@ -68,7 +68,11 @@ pub fn growth_many<'py>(
         };
         let is_last =
             |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
-        let done = py.detach(|| on_threads(&jobs, threads, go, is_last));
+        let report = Report {
+            function: options.progress.as_ref(),
+            before: found.len(),
+        };
+        let done = py.detach(|| on_threads(&jobs, threads, &report, go, is_last));
         let mut raised = done.raised.or_else(|| py.check_signals().err());
         for ((run, span, _), outcome) in jobs.iter().zip(done.results) {
             let row = match outcome {
@@ -114,7 +118,7 @@ fn row_of<'py>(
         false => PyArray2::from_vec2(py, &growth.sums)?,
     };
     Ok((
-        status_of(&solution.stop),
+        solution.stop.status(),
         solution.stop.name().to_owned(),
         message,
         solution.t_last,

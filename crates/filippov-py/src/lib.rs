@@ -12,6 +12,7 @@ mod exponents;
 mod inspect;
 mod itineraries;
 mod laws;
+mod page;
 mod prepared_run;
 mod regions;
 mod run;
@@ -44,6 +45,8 @@ mod _core {
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]
     use super::itineraries::HeldMotions;
+    #[pymodule_export]
+    use super::page::{answer_page, pack_page, page_of, PageModel};
     #[pymodule_export]
     use super::regions::Regions;
     #[pymodule_export]

@@ -3,8 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, not_finite, state_text, Held, Method, Mode, PiecewiseSystem, Segment, Side,
-    Solution, Stats, Stop,
+    as_multiplier, message_of, not_finite, Held, Method, Mode, Segment, Side, Solution, Stats, Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -169,31 +168,6 @@ pub fn is_interruption(solution: &Solution) -> bool {
     raised.is_some_and(|e| Python::attach(|py| e.is_instance_of::<PyKeyboardInterrupt>(py)))
 }
 
-/// Why a run ended, where, and what to try.
-pub fn message_of(system: &dyn PiecewiseSystem, solution: &Solution, n_visible: usize) -> String {
-    let mode = Mode::new(solution.mode.entries()[..n_visible].to_vec());
-    let (t, x) = (solution.t_last, solution.last_state());
-    let name = |j| system.surface_name(j);
-    let message = solution.stop.message(t, &mode, name);
-    match &solution.stop {
-        Stop::NotFinite => match not_finite(system, t, x, &solution.discrete, &solution.mode) {
-            Some(place) => format!("{message} {}", place.text(name)),
-            None => message,
-        },
-        Stop::FieldRaised(_) => format!("{message} The last good state is {}.", state_text(x)),
-        _ => message,
-    }
-}
-
-/// 0 at the end of the span, 1 where the run was to stop, negative where it failed.
-pub fn status_of(stop: &Stop) -> i32 {
-    match stop {
-        Stop::End => 0,
-        stop if stop.is_success() => 1,
-        _ => -1,
-    }
-}
-
 #[pymethods]
 impl Run {
     #[getter]
@@ -227,18 +201,9 @@ impl Run {
 
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
-        // A crossing or a touch of surfaces without an entry in the mode is not told.
-        let visible = |mode: &Mode| mode.entries()[..self.n_visible].to_vec();
-        let is_told = |s: &&filippov::Switch| {
-            !matches!(s.kind.name(), "crossing" | "grazing")
-                || s.surfaces.iter().any(|&j| j < self.n_visible)
-                || visible(&s.mode_before) != visible(&s.mode_after)
-        };
         let solution = self.solution();
         solution
-            .switches
-            .iter()
-            .filter(is_told)
+            .switches_of_first(self.n_visible)
             .map(|s| {
                 let visible = s.surfaces.iter().filter(|&&j| j < self.n_visible);
                 let visible: Vec<usize> = visible.copied().collect();
@@ -307,7 +272,7 @@ impl Run {
 
     #[getter]
     fn status(&self) -> i32 {
-        status_of(&self.solution().stop)
+        self.solution().stop.status()
     }
 
     #[getter]

@@ -2,6 +2,7 @@
 
 use filippov::action::{Clock, Trigger};
 use filippov::{SavedAction, SavedSystem};
+use filippov_web::unpack;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -51,10 +52,10 @@ pub fn save_system<'py>(
     Ok(PyBytes::new(py, &saved.to_bytes()))
 }
 
-/// What [`save_system`] wrote.
+/// What [`save_system`] wrote, with the section of a page behind it or without.
 #[pyfunction]
 pub fn load_system(py: Python<'_>, data: &[u8]) -> PyResult<Loaded> {
-    let saved = SavedSystem::from_bytes(data).map_err(refused)?;
+    let (saved, _) = unpack(data).map_err(refused)?;
     let actions = saved.actions.into_iter().map(|action| {
         let (when, numbers) = trigger_row(action.trigger);
         let map = action.map.map(TracedSystem::build);

@@ -16,7 +16,7 @@ use crate::derivatives::{Failure, RunDerivatives, Wanted};
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::{is_interruption, Run};
 use crate::systems::TracedSystem;
-use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
+use crate::threads::{on_threads, Report, CHUNK_PER_THREAD, POLL_EVERY};
 
 type Outcome = Result<(Solution, Option<RunDerivatives>), Failure>;
 
@@ -24,7 +24,7 @@ type Outcome = Result<(Solution, Option<RunDerivatives>), Failure>;
 #[pyclass(frozen, module = "filippov._core")]
 pub struct RunOptions {
     pub options: Options,
-    progress: Option<Py<PyAny>>,
+    pub progress: Option<Py<PyAny>>,
 }
 
 #[pymethods]
@@ -123,7 +123,11 @@ pub fn solve_many(
         };
         let is_last =
             |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
-        let done = py.detach(|| on_threads(&prepared, threads, run, is_last));
+        let report = Report {
+            function: options.progress.as_ref(),
+            before: runs.len(),
+        };
+        let done = py.detach(|| on_threads(&prepared, threads, &report, run, is_last));
         let is_cut = done.results.len() < prepared.len();
         for (prepared, outcome) in prepared.into_iter().zip(done.results) {
             let (solution, derivatives) = outcome.map_err(PyErr::from)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
 use filippov::{
-    Error, Kind, Piece, SlidingRule, Solution, Stop, UserFunction, Warning, WarningCode,
+    message_of, Error, Kind, Piece, SlidingRule, Solution, Stop, UserFunction, Warning, WarningCode,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
@@ -14,10 +14,10 @@ use pyo3::types::PyDict;
 
 use crate::callbacks::{CalledEvent, CompiledEvent, EventExpression, Signal};
 use crate::prepared_run::{ActionRow, PreparedRun};
-use crate::run::{is_interruption, message_of, status_of, take_error};
+use crate::run::{is_interruption, take_error};
 use crate::solve::RunOptions;
 use crate::systems::TracedSystem;
-use crate::threads::{on_threads, CHUNK_PER_THREAD};
+use crate::threads::{on_threads, Report, CHUNK_PER_THREAD};
 
 type Outcome = Result<Solution, Error>;
 
@@ -70,7 +70,11 @@ pub fn solve_points<'py>(
             }
         };
         let is_last = |outcome: &Outcome| outcome.as_ref().is_ok_and(is_interruption);
-        let done = py.detach(|| on_threads(&jobs, threads, go, is_last));
+        let report = Report {
+            function: options.progress.as_ref(),
+            before: points.status.len(),
+        };
+        let done = py.detach(|| on_threads(&jobs, threads, &report, go, is_last));
         for (((run, _, span), outcome), row) in jobs.iter().zip(done.results).zip(chunk) {
             let signals = Signals {
                 outputs: &outputs,
@@ -388,7 +392,7 @@ impl Points {
         };
         let error = take_error(&mut solution);
         let mut message = message_of(&**run.core(), &solution, run.n_visible());
-        let (status, reason) = (status_of(&solution.stop), solution.stop.name());
+        let (status, reason) = (solution.stop.status(), solution.stop.name());
         if matches!(solution.stop, Stop::Interrupted) {
             self.raised = Some(PyKeyboardInterrupt::new_err(()));
         }

@@ -23,24 +23,45 @@ pub struct Done<R> {
     pub raised: Option<PyErr>,
 }
 
+/// Who is told how far some jobs are: a function of the time that a run reached, and of the number of finished jobs.
+pub struct Report<'a> {
+    pub function: Option<&'a Py<PyAny>>,
+    /// Jobs that were finished before these.
+    pub before: usize,
+}
+
+impl Report<'_> {
+    fn call(&self, py: Python<'_>, t: f64, n_finished: usize) -> PyResult<()> {
+        let arguments = (t, self.before + n_finished);
+        let called = self.function.map(|report| report.call1(py, arguments));
+        called.transpose().map(|_| ())
+    }
+}
+
 /// Does `work` for every job, each thread taking the next one that is left; no other one after a signal, or after a
 /// result that `is_last`. To be called without the interpreter's lock.
 pub fn on_threads<J: Sync, R: Send>(
     jobs: &[J],
     threads: usize,
+    report: &Report,
     work: impl Fn(&J, Interrupt) -> R + Sync,
     is_last: impl Fn(&R) -> bool + Sync,
 ) -> Done<R> {
     let next = AtomicUsize::new(0);
+    let n_finished = AtomicUsize::new(0);
     let is_interrupted = AtomicBool::new(false);
     let signal: Mutex<Option<PyErr>> = Mutex::new(None);
     let results: Vec<Mutex<Option<R>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let go = |asks: bool| {
         let mut asked = Instant::now();
-        let mut interrupt = |_: f64| {
+        let mut interrupt = |t: f64| {
             if asks && asked.elapsed() >= POLL_EVERY {
                 asked = Instant::now();
-                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                let told = Python::attach(|py| {
+                    py.check_signals()?;
+                    report.call(py, t, n_finished.load(Ordering::Relaxed))
+                });
+                if let Err(raised) = told {
                     *signal.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
                     is_interrupted.store(true, Ordering::Relaxed);
                 }
@@ -59,6 +80,7 @@ pub fn on_threads<J: Sync, R: Send>(
             *results[index]
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner) = Some(result);
+            n_finished.fetch_add(1, Ordering::Relaxed);
         }
     };
     std::thread::scope(|scope| {

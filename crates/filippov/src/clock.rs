@@ -2,12 +2,12 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The clock by which [`crate::Options::max_wall_time`] is measured.
 #[derive(Clone, Debug, Default)]
 pub enum Clock {
-    /// The monotonic clock of the computer.
+    /// The monotonic clock of the computer. There is none on `wasm32-unknown-unknown`.
     #[default]
     Computer,
     /// A clock that the caller advances.
@@ -15,13 +15,31 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// The time of this clock.
-    pub fn now(&self) -> Instant {
+    /// The time of this clock, since it was first read; zero if it does not run.
+    pub fn now(&self) -> Duration {
         match self {
-            Clock::Computer => Instant::now(),
+            Clock::Computer => since_first_read(),
             Clock::Manual(clock) => clock.look(),
         }
     }
+
+    /// Does this clock measure time? The clock of the computer does not on `wasm32-unknown-unknown`.
+    pub fn runs(&self) -> bool {
+        matches!(self, Clock::Manual(_)) || HAS_MONOTONIC_CLOCK
+    }
+}
+
+const HAS_MONOTONIC_CLOCK: bool = !cfg!(all(target_arch = "wasm32", target_os = "unknown"));
+
+fn since_first_read() -> Duration {
+    use std::sync::OnceLock;
+    use std::time::Instant;
+
+    static START: OnceLock<Instant> = OnceLock::new();
+    if !HAS_MONOTONIC_CLOCK {
+        return Duration::ZERO; // `Instant::now` panics there.
+    }
+    START.get_or_init(Instant::now).elapsed()
 }
 
 /// A clock that stands still unless it is advanced, by [`advance`](Self::advance) and by every look at it. With it, what
@@ -39,7 +57,6 @@ impl Clock {
 /// ```
 #[derive(Debug)]
 pub struct ManualClock {
-    start: Instant,
     nanoseconds: AtomicU64,
     per_look: Duration,
 }
@@ -48,7 +65,6 @@ impl ManualClock {
     /// A clock that every look advances by `per_look`.
     pub fn new(per_look: Duration) -> Self {
         ManualClock {
-            start: Instant::now(),
             nanoseconds: AtomicU64::new(0),
             per_look,
         }
@@ -61,9 +77,9 @@ impl ManualClock {
     }
 
     /// The time of the clock, which this look advances.
-    pub fn look(&self) -> Instant {
+    pub fn look(&self) -> Duration {
         self.advance(self.per_look);
-        self.start + self.elapsed()
+        self.elapsed()
     }
 
     /// How far the clock was advanced. This is no look at it.

@@ -90,6 +90,7 @@ mod mode;
 pub mod motion;
 mod options;
 mod patience;
+mod powers;
 mod record;
 mod saved;
 pub mod sparse;
@@ -106,9 +107,9 @@ pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
-    classify, contradicts, hidden_dynamics, intersection_field, leg, not_finite, state_text,
-    Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, Leg, LegError,
-    NotFinitePlace, Over, PointKind,
+    classify, contradicts, hidden_dynamics, intersection_field, leg, message_of, not_finite,
+    state_text, Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, Leg,
+    LegError, NotFinitePlace, Over, PointKind,
 };
 pub use integrate::{Integrator, Problem};
 pub use mode::{Mode, Signs};
@@ -118,7 +119,7 @@ pub use record::{
     DecisionRecord, Gradient, Held, InstantRecord, ObservedStep, Observer, Piece, Segment, Side,
     Solution, StartingZero,
 };
-pub use saved::{RunnableSystem, SavedAction, SavedSystem};
+pub use saved::{ReadySystem, RunnableSystem, SavedAction, SavedSystem};
 pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};

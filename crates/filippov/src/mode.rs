@@ -81,6 +81,13 @@ impl Mode {
         self.entries().iter().filter(|&&e| e == 0).count()
     }
 
+    /// The entries of the first `n` surfaces, as a mode of these.
+    #[must_use]
+    pub fn first(&self, n: usize) -> Mode {
+        let entries = self.entries();
+        Mode::of(&entries[..n.min(entries.len())])
+    }
+
     /// The same mode with entry `j` replaced.
     #[must_use]
     pub fn with(&self, j: usize, entry: i8) -> Mode {

@@ -14,7 +14,9 @@ use crate::integrate::Problem;
 use crate::options::Options;
 use crate::record::Solution;
 use crate::switch::Kind;
-use crate::system::{check_index, inconsistent, Definition, Laws, TracedMap, TracedSystem};
+use crate::system::{
+    check_index, inconsistent, Definition, LawAction, Laws, TracedMap, TracedSystem,
+};
 use crate::system::{Action, Actions, Clock, Trigger};
 
 const CONTENT: Tag = Tag(*b"SYST");
@@ -93,6 +95,18 @@ pub struct SavedAction {
 impl SavedSystem {
     /// The system as a container. Equal systems give equal bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
+        self.written().finish()
+    }
+
+    /// As [`SavedSystem::to_bytes`], with one more section that holds a text.
+    pub fn to_bytes_with(&self, tag: Tag, text: &str) -> Vec<u8> {
+        let mut writer = self.written();
+        writer.section(tag);
+        writer.text(text);
+        writer.finish()
+    }
+
+    fn written(&self) -> Writer {
         let mut writer = Writer::new(CONTENT);
         self.definition.write_sections(&mut writer);
         writer.section(VALUES);
@@ -109,7 +123,7 @@ impl SavedSystem {
         for map in self.actions.iter().filter_map(|action| action.map.as_ref()) {
             map.write_sections(&mut writer);
         }
-        writer.finish()
+        writer
     }
 
     /// The system that [`SavedSystem::to_bytes`] wrote: nothing is compiled yet, everything is checked.
@@ -118,7 +132,29 @@ impl SavedSystem {
     /// [`Error::Expression`] for other bytes and damaged ones, and those of [`SavedSystem::check`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let mut container = Container::open(bytes, CONTENT)?;
-        let definition = Definition::read_sections(&mut container)?;
+        let system = Self::read(&mut container)?;
+        container.finish()?;
+        Ok(system)
+    }
+
+    /// What [`SavedSystem::to_bytes_with`] wrote, and the text of its further section; no text if there is no such section.
+    ///
+    /// # Errors
+    /// As [`SavedSystem::from_bytes`].
+    pub fn from_bytes_with(bytes: &[u8], tag: Tag) -> Result<(Self, Option<String>), Error> {
+        let mut container = Container::open(bytes, CONTENT)?;
+        let system = Self::read(&mut container)?;
+        let mut text = None;
+        if let Some(mut section) = container.optional(tag) {
+            text = Some(section.text()?);
+            section.finish()?;
+        }
+        container.finish()?;
+        Ok((system, text))
+    }
+
+    fn read(container: &mut Container) -> Result<Self, Error> {
+        let definition = Definition::read_sections(container)?;
         let mut section = container.section(VALUES)?;
         let defaults = section.floats()?;
         let is_pinned = flag(&mut section)?;
@@ -138,12 +174,11 @@ impl SavedSystem {
         let mut actions = Vec::with_capacity(rows.len());
         for (trigger, has_map, name) in rows {
             let map = match has_map {
-                true => Some(Definition::read_sections(&mut container)?),
+                true => Some(Definition::read_sections(container)?),
                 false => None,
             };
             actions.push(SavedAction { trigger, map, name });
         }
-        container.finish()?;
         let system = SavedSystem {
             definition,
             defaults,
@@ -204,12 +239,14 @@ impl SavedSystem {
         }
         let n_parameters = self.definition.n_parameters();
         let law_names = self.definition.names.parameters[n_parameters..].to_vec();
+        let n_visible = self.definition.n_visible();
         let (system, laws) = self.definition.build(backend)?;
         Ok(RunnableSystem {
             system: system.with_parameters(self.defaults),
             laws: Arc::new(laws),
             law_names,
             maps,
+            n_visible,
         })
     }
 
@@ -265,6 +302,7 @@ pub struct RunnableSystem {
     laws: Arc<Laws>,
     law_names: Vec<String>,
     maps: Vec<(Trigger, TracedSystem, String)>,
+    n_visible: usize,
 }
 
 impl RunnableSystem {
@@ -273,16 +311,16 @@ impl RunnableSystem {
         &self.system
     }
 
-    /// The system with these values of its parameters, and its discrete states at a start at (t, x).
+    /// How many of its surfaces a user sees, the first ones ([`Definition::n_visible`]).
+    pub fn n_visible(&self) -> usize {
+        self.n_visible
+    }
+
+    /// The system with these values of its parameters, its maps, its laws, and its discrete states at a start at (t, x).
     ///
     /// # Errors
     /// [`Error::WrongLength`] if there are not as many values as parameters, or states.
-    pub fn at(
-        &self,
-        parameters: &[f64],
-        t: f64,
-        x: &[f64],
-    ) -> Result<(TracedSystem, Vec<f64>), Error> {
+    pub fn at(&self, parameters: &[f64], t: f64, x: &[f64]) -> Result<ReadySystem<'_>, Error> {
         let wrong = |name, found, expected| Error::WrongLength {
             name,
             found,
@@ -309,7 +347,15 @@ impl RunnableSystem {
                 .map_err(|FieldError(_)| Error::Inconsistent {
                     detail: "an expression could not be evaluated",
                 })?;
-        Ok((system, discrete))
+        let maps = self.maps.iter();
+        let maps = maps.map(|(_, map, _)| TracedMap::new(map.with_parameters(parameters.to_vec())));
+        Ok(ReadySystem {
+            of: self,
+            maps: maps.collect(),
+            laws: self.laws.actions(n_states, parameters),
+            system,
+            discrete,
+        })
     }
 
     /// Solves an initial value problem, with the actions and the laws.
@@ -324,37 +370,55 @@ impl RunnableSystem {
         options: &Options,
         events: &[UserEvent],
     ) -> Result<Solution, Error> {
-        let (system, discrete) = self.at(parameters, t_span.0, y0)?;
-        let maps = self.maps.iter();
-        let maps: Vec<TracedMap> = maps
-            .map(|(_, map, _)| TracedMap::new(map.with_parameters(parameters.to_vec())))
-            .collect();
-        let laws = self.laws.actions(y0.len(), parameters);
-        let given = self
-            .maps
-            .iter()
-            .zip(&maps)
-            .map(|((trigger, _, name), map)| Action {
-                trigger: trigger.clone(),
-                map,
-                name: name.clone(),
-                kind: Some(match trigger {
-                    Trigger::Surface { .. } | Trigger::Jump => Kind::Reset,
-                    Trigger::Times(_) | Trigger::Clock { .. } => Kind::Clock,
-                }),
-            });
-        let laws = laws.iter().map(|law| Action {
+        let ready = self.at(parameters, t_span.0, y0)?;
+        let (system, actions) = (ready.system(), ready.actions());
+        let problem = Problem::new(system, t_span, y0).options(options);
+        problem.events(events).actions(&actions).solve()
+    }
+}
+
+/// A compiled system with values of its parameters, and with its discrete states at a start.
+pub struct ReadySystem<'a> {
+    of: &'a RunnableSystem,
+    system: TracedSystem,
+    discrete: Vec<f64>,
+    maps: Vec<TracedMap>,
+    laws: Vec<LawAction>,
+}
+
+impl ReadySystem<'_> {
+    /// The system.
+    pub fn system(&self) -> &TracedSystem {
+        &self.system
+    }
+
+    /// The discrete states at the start.
+    pub fn discrete(&self) -> &[f64] {
+        &self.discrete
+    }
+
+    /// What changes the state in instants: the actions, then the laws.
+    pub fn actions(&self) -> Actions<'_> {
+        let given = self.of.maps.iter().zip(&self.maps);
+        let given = given.map(|((trigger, _, name), map)| Action {
+            trigger: trigger.clone(),
+            map,
+            name: name.clone(),
+            kind: Some(match trigger {
+                Trigger::Surface { .. } | Trigger::Jump => Kind::Reset,
+                Trigger::Times(_) | Trigger::Clock { .. } => Kind::Clock,
+            }),
+        });
+        let laws = self.laws.iter().map(|law| Action {
             trigger: law.trigger.clone(),
             map: &law.map,
-            name: self.law_names[law.index].clone(),
+            name: self.of.law_names[law.index].clone(),
             kind: law.kind,
         });
-        let actions = Actions {
+        Actions {
             list: given.chain(laws).collect(),
-            discrete,
-        };
-        let problem = Problem::new(&system, t_span, y0).options(options);
-        problem.events(events).actions(&actions).solve()
+            discrete: self.discrete.clone(),
+        }
     }
 }
 

@@ -119,6 +119,15 @@ impl Stop {
         )
     }
 
+    /// 0 at the end of the span, 1 where the run was to stop, -1 where it failed.
+    pub fn status(&self) -> i32 {
+        match self {
+            Stop::End => 0,
+            stop if stop.is_success() => 1,
+            _ => -1,
+        }
+    }
+
     /// A stable name of the reason.
     pub fn name(&self) -> &'static str {
         match self {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +14,11 @@ from filippov.analysis.grid import grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
 from filippov.analysis.points import Table, Task, end_times, outputs_for, prepare_for, run_task
-from filippov.analysis.sections import clocks_of
+from filippov.analysis.sections import AnySection, Phase, clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
 from filippov.notices import show_summary
+from filippov.progress import Report, print_progress
 from filippov.sliding_policy import fit_kappa
 
 if TYPE_CHECKING:
@@ -72,7 +74,7 @@ def poincare(
     units : dict, optional
         Units of states, of parameters, and of the time under ``"t"``; they become attributes.
     **options
-        Options of `solve_ivp`.
+        Options of `solve_ivp`, among them ``progress``: a bar of the time, or a function of it.
 
     Returns
     -------
@@ -138,7 +140,7 @@ def poincare(
     if not (np.isfinite(y0_rows).all() and np.isfinite(p_rows).all()):
         raise InputError("y0, params: must be finite")
     span = span_of(t_span, section, n is not None)
-    checked = options_of(options, span, len(grid.states))
+    checked = options_of({**options, "progress": None}, span, len(grid.states))
     observed = observation_of(
         section,
         checked,
@@ -173,11 +175,15 @@ def poincare(
     )
     names = [output.name for output in outputs]
     given = {"section": repr(own), "params": as_json(values), "options": as_json(checked._asdict())}
+    report = _report(options.get("progress"), (span[0], float(ends[0])), own, n)
     try:
-        table = run_task(task)
+        table = run_task(task._replace(options=checked._replace(progress=report)))
     except Interrupted as cut:
         partial = _dataset(cut.partial, grid.states, names, prepared.surfaces, units or {}, given)
         raise Interrupted(partial.attrs["message"], partial=partial) from None
+    finally:
+        if report is not None:
+            report.close()
     found = _dataset(table, grid.states, names, prepared.surfaces, units or {}, given)
     where = (
         "the attributes n_warnings and warnings of the result have their number and codes; "
@@ -185,6 +191,18 @@ def poincare(
     )
     show_summary(kinds_of(table["warnings"]), 1, "runs", where, found)
     return found
+
+
+def _report(wanted: Any, span: tuple[float, float], section: AnySection, n: int | None) -> Report | None:
+    """Return what is called with the time reached: the end is known without `n`, or with a period."""
+    if wanted is None or wanted is False:
+        return None
+    if wanted is True:
+        is_known = n is None or isinstance(section, Phase)
+        return Report(print_progress(span if is_known else (span[0], math.inf), "returns"))
+    if not callable(wanted):
+        raise InputError("progress: True, False, or a function of the time reached, is needed")
+    return Report(lambda t, *_: wanted(t))
 
 
 # The variables that every result has.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,8 +15,9 @@ import numpy.typing as npt
 from filippov.analysis.plan import Piece, Plan, run_chunk
 from filippov.analysis.points import Table
 from filippov.errors import InputError, Interrupted
+from filippov.progress import Progress
 
-__all__ = ["Progress", "as_executor", "run_pieces"]
+__all__ = ["as_executor", "count_points", "run_pieces"]
 
 Array = npt.NDArray[np.float64]
 Take = Callable[[int, Table, Array], None]
@@ -152,46 +151,7 @@ def _keep_cut(flying: dict[int, Any], keep: Keep, *, waits: bool) -> None:
             continue
 
 
-class Progress:
-    """A line of the terminal that says how far a sweep is, how many points failed, and how long it will take.
-
-    Parameters
-    ----------
-    wanted : bool or callable
-        True for the line; or a function of the number of points that are done, of all, and of those that
-        failed.
-    total : int
-        Number of points.
-    done : int
-        Points that were done before.
-    """
-
-    def __init__(self, wanted: Any, total: int, done: int) -> None:
-        self._report = wanted if callable(wanted) else None
-        self._is_shown = wanted is True
-        self._total, self.done, self._failed = total, done, 0
-        self._before = done
-        self._started = time.monotonic()
-
-    def add(self, table: Table) -> None:
-        """Count the points of a table."""
-        self.done += len(table["status"])
-        self._failed += int(np.count_nonzero(np.asarray(table["status"]) < 0))
-        if self._report is not None:
-            self._report(self.done, self._total, self._failed)
-        if self._is_shown:
-            end = "\n" if self.done >= self._total else ""
-            sys.stderr.write(f"\r{self.text()}{end}")
-            sys.stderr.flush()
-
-    def text(self) -> str:
-        """Return the line."""
-        fraction = self.done / self._total
-        width = 24
-        bar = "#" * int(width * fraction)
-        failed = f", {self._failed} failed" if self._failed else ""
-        elapsed = time.monotonic() - self._started
-        since = self.done - self._before
-        left = elapsed * (self._total - self.done) / since if since else 0.0
-        clock = f"{int(left) // 3600}:{int(left) // 60 % 60:02}:{int(left) % 60:02} left"
-        return f"[{bar:<{width}}] {100 * fraction:5.1f} % of {self._total} points{failed}, {clock}   "
+def count_points(progress: Progress, table: Table) -> None:
+    """Count the points of a table."""
+    status = np.asarray(table["status"])
+    progress.add(len(status), int(np.count_nonzero(status < 0)))

@@ -34,9 +34,10 @@ from filippov.analysis.dataset import REASONS, as_json, coordinates_of, dims_of,
 from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan
 from filippov.analysis.points import COLUMNS, Table
-from filippov.analysis.schedule import Progress, run_pieces
+from filippov.analysis.schedule import count_points, run_pieces
 from filippov.caution import warn_user
 from filippov.errors import InputError, Interrupted
+from filippov.progress import Progress
 
 __all__ = ["Store", "open_sweep", "run_with_store"]
 
@@ -387,7 +388,11 @@ def run_with_store(
     need("zarr", "store=")
     store = Store(path)
     size = store.begin(plan, chunk_size)
-    if not store.is_whole:
+    if store.is_whole:
+        bar = Progress(progress, plan.n_points, plan.n_points)
+        bar.show(plan.n_points)
+        bar.close()
+    else:
         store.discard_damaged()
         pieces = plan.pieces(size)
         finished = store.finished()
@@ -399,10 +404,11 @@ def run_with_store(
         ]
         done = sum(pieces[index].stop - pieces[index].start for index in finished)
         bar = Progress(progress, plan.n_points, done)
+        bar.show(done)
 
         def take(index: int, table: Table, carry: npt.NDArray[np.float64]) -> None:
             store.write(index, table, carry)
-            bar.add(table)
+            count_points(bar, table)
 
         def carry_after(index: int) -> npt.NDArray[np.float64]:
             carry: npt.NDArray[np.float64] = store.read(index, "carry")["carry"]
@@ -415,6 +421,8 @@ def run_with_store(
                 f"{bar.done} of {plan.n_points} points are in the store {store.path}; call the sweep again "
                 "with the same arguments to go on."
             ) from None
+        finally:
+            bar.close()
         if len(store.finished()) < len(pieces) and not store.is_whole:
             return None
         try:

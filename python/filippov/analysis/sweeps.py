@@ -14,10 +14,11 @@ from filippov.analysis.observe import check_keywords, check_system, observation_
 from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan, plan_of
 from filippov.analysis.points import Table, concatenate, prepare_for
-from filippov.analysis.schedule import Progress, as_executor, run_pieces
+from filippov.analysis.schedule import as_executor, count_points, run_pieces
 from filippov.ensemble import check_threads
 from filippov.errors import InputError, Interrupted
 from filippov.notices import show_summary
+from filippov.progress import Progress
 from filippov.sliding_policy import fit_kappa
 
 if TYPE_CHECKING:
@@ -88,8 +89,8 @@ def sweep(
         ``(k, m)``: do only the k-th of m parts of the chunks, k from 0 on; for arrays of jobs that share a
         store.
     progress : bool or callable, optional
-        Print how far the sweep is, or call a function of the number of points done, of all, and of those that
-        failed.
+        Show a bar with rate and time left, in a terminal or a notebook; or call a function of the number of
+        points done, of all, and of those that failed.
     **options
         Options of `solve_ivp`.
 
@@ -266,12 +267,12 @@ def run_plan(
     pieces = plan.pieces(int(chunk_size or plan.usual_chunk_size()))
     tables: list[Table | None] = [None] * len(pieces)
     carries: dict[int, Any] = {}
-    bar = Progress(progress, plan.n_points, 0)
+    bar = Progress(progress, plan.n_points)
 
     def take(index: int, table: Table, carry: Any) -> None:
         tables[index] = table
         carries[index] = carry
-        bar.add(table)
+        count_points(bar, table)
 
     try:
         run_pieces(
@@ -287,6 +288,8 @@ def run_plan(
             "exception. A sweep with store= goes on when it is called again.",
             partial=partial,
         ) from None
+    finally:
+        bar.close()
     return _dataset(plan, tables)
 
 

@@ -40,6 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0
     """
     parser = build_parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may follow
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
     given = parser.parse_args(arguments)
     if given.run is None:
         parser.print_help()

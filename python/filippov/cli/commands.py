@@ -14,13 +14,18 @@ import numpy as np
 from filippov import problems
 from filippov.cli.mistakes import Mistake
 from filippov.cli.model import Model, load_model, of_problem
-from filippov.cli.solving import initial_state, interval, options_of_run, parameters
-from filippov.cli.tables import STDOUT, report_beside, write_csv, write_parquet
+from filippov.cli.pictures import write_picture
+from filippov.cli.solving import initial_state, interval, options_of_run, parameters, wants_progress
+from filippov.cli.tables import write_csv, write_parquet
+from filippov.cli.targets import STDOUT, check_targets, report_beside, write_json
 from filippov.errors import Interrupted
+from filippov.progress import print_progress
 from filippov.solution import Solution
 
-__all__ = ["check_needs", "check_picture", "check_target", "demo", "list_problems", "say", "solve"]
+__all__ = ["check_needs", "check_picture", "demo", "list_problems", "print_completion", "say", "solve"]
 
+# Seconds after which a run on a terminal has a bar.
+_PATIENCE = 0.5
 _PICTURES = (".png", ".pdf", ".svg", ".jpg", ".eps")
 
 
@@ -31,8 +36,21 @@ def list_problems(given: argparse.Namespace) -> int:
     shown = [p for p in found if text in p.name.lower() or text in p.note.lower()]
     if not shown:
         raise Mistake(f"no problem has {given.text!r} in its name or note")
+    if given.json:
+        write_json([{"name": problem.name, "note": problem.note} for problem in shown], STDOUT)
+        return 0
     for problem in shown:
         print(f"{problem.name:28s}  {problem.note}")
+    return 0
+
+
+def print_completion(given: argparse.Namespace) -> int:
+    """Print what makes a shell complete the command."""
+    try:
+        from argcomplete import shellcode
+    except ImportError as error:
+        raise ImportError('completion needs argcomplete: pip install "filippov[completion]"') from error
+    print(shellcode(["filippov"], shell=given.shell))
     return 0
 
 
@@ -49,7 +67,7 @@ def demo(given: argparse.Namespace) -> int:
     if not given.no_plot:
         path = given.plot or Path(f"{problem.name}.png")
         check_picture(path)
-        check_target(path)
+        check_targets(path)
     solution = problem.solve()
     _print(solution, model, {})
     if not given.no_plot:
@@ -77,20 +95,20 @@ def solve(given: argparse.Namespace) -> int:
             raise Mistake(f"--phase: two or three states are needed, not {len(given.phase)}")
     else:
         check_needs(given, ("phase", "states", "dark"), "--plot, the name of a picture")
-    if given.csv is None and given.parquet is None:
-        check_needs(given, ("points",), "--csv or --parquet, where the times are written")
+    if given.csv is None and given.parquet is None and given.json is None:
+        check_needs(given, ("points",), "--csv, --json or --parquet, where the times are written")
     if given.parquet == STDOUT:
         raise Mistake("--parquet: the name of a file is needed; --csv - writes to the standard output")
-    for path in (given.plot, given.csv, given.parquet):
-        if path is not None:
-            check_target(path)
+    check_targets(given.plot, given.csv, given.parquet, given.json)
+    if wants_progress(given):
+        options["progress"] = print_progress((start, end), delay=0.0 if given.progress else _PATIENCE)
     cut = None
     try:
         solution = model.system.solve((start, end), y0, params=values, events=model.events, **options)
     except Interrupted as error:
         cut, solution = error, error.partial
     if not given.quiet:
-        with report_beside(given.csv):
+        with report_beside(given.csv, given.json):
             _print(solution, model, values)
     if given.csv is not None:
         write_csv(solution, given.csv)
@@ -98,6 +116,9 @@ def solve(given: argparse.Namespace) -> int:
     if given.parquet is not None:
         write_parquet(solution, given.parquet, _notes(solution, model, values))
         say(given, f"written: {given.parquet}, {len(solution.t)} rows")
+    if given.json is not None:
+        write_json(_as_json(solution, model, values), given.json)
+        say(given, f"written: {given.json}")
     if given.plot is not None:
         _draw(solution, given.plot, given.states, given.phase, given.dark, model.name)
         say(given, f"picture: {given.plot}")
@@ -119,8 +140,8 @@ def _print(solution: Solution, model: Model, values: dict[str, float]) -> None:
         print(f"at the end: t={solution.t[-1]:.12g}, {state}")
     print(f"effort:     {solution.nfev} evaluations, {solution.stats['backend']}")
     print(solution.switches)
-    for number, times in enumerate(solution.t_events or []):
-        print(f"event {number}: {len(times)} times {np.array2string(times, threshold=8, precision=9)}")
+    for name, times in zip(solution.event_names, solution.t_events or [], strict=False):
+        print(f"{name}: {len(times)} times {np.array2string(times, threshold=8, precision=9)}")
 
 
 def _closed(solution: Solution) -> int:
@@ -142,10 +163,41 @@ def _notes(solution: Solution, model: Model, values: dict[str, float]) -> dict[s
     }
 
 
+def _as_json(solution: Solution, model: Model, values: dict[str, float]) -> dict[str, Any]:
+    """Return what a run gave as names and numbers: the times and states that are kept, switches, events."""
+    return {
+        "model": model.name,
+        "params": {**model.system.params, **values},
+        "surfaces": solution.surfaces,
+        "success": solution.success,
+        "status": solution.status,
+        "message": solution.message,
+        "warnings": [{"t": w.t, "code": w.code, "message": w.message} for w in solution.warnings],
+        "t": solution.t,
+        "y": dict(zip(solution.states, solution.y, strict=True)),
+        "outputs": solution.outputs,
+        "segments": [{"t_start": s.t_start, "t_end": s.t_end, "mode": s.mode} for s in solution.segments],
+        "switches": [
+            {
+                "t": s.t,
+                "kind": s.kind,
+                "surfaces": [solution.surfaces[k] for k in s.surfaces],
+                "mode_before": s.mode_before,
+                "mode_after": s.mode_after,
+                "y_before": s.y_before,
+                "y_after": s.y_after,
+            }
+            for s in solution.switches
+        ],
+        "events": dict(zip(solution.event_names, solution.t_events or [], strict=False)),
+        "stats": solution.stats,
+    }
+
+
 def say(given: argparse.Namespace, text: str) -> None:
     """Print a line of the report, unless it is not wanted; not where the table is printed."""
     if not given.quiet:
-        with report_beside(given.csv):
+        with report_beside(getattr(given, "csv", None), getattr(given, "json", None)):
             print(text)
 
 
@@ -154,16 +206,6 @@ def check_needs(given: argparse.Namespace, names: Sequence[str], needed: str) ->
     for name in names:
         if getattr(given, name):
             raise Mistake(f"--{name}: needs {needed}")
-
-
-def check_target(path: Path) -> None:
-    """Refuse a file that cannot be written, before the run."""
-    if path == STDOUT:
-        return
-    if path.is_dir():
-        raise Mistake(f"{path}: this is a folder; the name of a file is needed")
-    if not path.resolve().parent.is_dir():
-        raise Mistake(f"{path}: there is no such folder")
 
 
 def check_picture(path: Path) -> None:
@@ -189,21 +231,13 @@ def _draw(
     dark: bool,
     title: str,
 ) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")  # a picture is written, no window is opened
-    from filippov import plot
-
     if not len(solution.t):
         print("nothing to draw: the run failed at its start", file=sys.stderr)
         return
-    with plot.style(dark=dark):
-        ax: Any
+
+    def draw(plot: Any) -> Any:
         if phase is None:
-            ax = plot.time_series(solution, states=states)
-        elif len(phase) == 2:
-            ax = plot.phase(solution, phase[0], phase[1])
-        else:
-            ax = plot.phase3d(solution, phase[0], phase[1], phase[2])
-        ax.set_title(title)
-        ax.figure.savefig(path)
+            return plot.time_series(solution, states=states)
+        return (plot.phase if len(phase) == 2 else plot.phase3d)(solution, *phase)
+
+    write_picture(path, dark, title, draw)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from filippov.cli.commands import check_needs, check_picture, check_target
+from filippov.cli.commands import check_needs, check_picture, say
 from filippov.cli.expressions import expression
 from filippov.cli.mistakes import Mistake, hint, number
 from filippov.cli.model import Model, load_model
-from filippov.cli.solving import add_model_options, initial_state, options_of_run, parameters
-from filippov.cli.tables import STDOUT, report_beside, write_rows
+from filippov.cli.pictures import write_picture
+from filippov.cli.solving import add_model_options, initial_state, options_of_run, parameters, wants_progress
+from filippov.cli.tables import write_rows
+from filippov.cli.targets import STDOUT, check_targets, report_beside, write_json
 from filippov.cycles import Branch, Cycle, Equilibrium, continuation, equilibrium, limit_cycle
 from filippov.errors import ModelError
 
@@ -51,6 +52,9 @@ def add_continue_options(command: argparse.ArgumentParser) -> None:
     out.add_argument("--y", metavar="NAME", help="what is drawn: a state, or period")
     out.add_argument("--dark", action="store_true", help="light lines on a dark ground")
     out.add_argument("--csv", type=Path, metavar="FILE", help="write one row per point; - prints them")
+    out.add_argument(
+        "--json", type=Path, metavar="FILE", help="write points and special points; - prints them"
+    )
     out.add_argument("--store", type=Path, metavar="FILE", help="write the branch for filippov.cycles")
     out.add_argument("--quiet", action="store_true", help="print nothing but failures")
 
@@ -64,7 +68,8 @@ def _add_search_options(command: argparse.ArgumentParser) -> None:
     how.add_argument("--method", metavar="NAME", help='"auto" (default), "Taylor", "DOPRI5", "Rodas5P", ...')
     how.add_argument("--sliding", metavar="RULE", help='where surfaces meet: "canopy" (default), ...')
     how.add_argument("--max-steps", type=int, metavar="N", help="give up a run after N steps")
-    command.set_defaults(max_wall_time=None, progress=False)
+    how.add_argument("--progress", action="store_true", help="show how far it is, as on a terminal")
+    command.set_defaults(max_wall_time=None)
 
 
 def cycle(given: argparse.Namespace) -> int:
@@ -85,22 +90,18 @@ def cycle(given: argparse.Namespace) -> int:
         with report_beside(given.json):
             _print_start(model, found)
     if given.json is not None:
-        text = json.dumps(_as_json(found, names), indent=1)
-        if given.json == STDOUT:
-            print(text)
-        else:
-            given.json.write_text(text + "\n", encoding="utf-8")
-            _say(given, given.json, f"written:     {given.json}")
+        write_json(_as_json(found, names), given.json)
+        say(given, f"written:     {given.json}")
     if given.plot is not None:
         _draw_cycle(given, found, names, model.name)
-        _say(given, given.json, f"picture:     {given.plot}")
+        say(given, f"picture:     {given.plot}")
     return 0
 
 
 def continue_(given: argparse.Namespace) -> int:
     """Follow a cycle or an equilibrium; print, draw and write its branch."""
     model, y0, values = _model(given)
-    _check_outputs(given, (given.plot, given.csv, given.store), ("x", "y", "dark"))
+    _check_outputs(given, (given.plot, given.csv, given.json, given.store), ("x", "y", "dark"))
     if given.store == STDOUT:
         raise Mistake("--store: the name of a file is needed; --csv - prints the points")
     known = list(model.system.params)
@@ -125,24 +126,28 @@ def continue_(given: argparse.Namespace) -> int:
     _check_drawn(given, model, start, len(y0))
     cut = None
     try:
-        branch = continuation(start, given.parameter, bounds, **options)
+        branch = continuation(start, given.parameter, bounds, progress=wants_progress(given), **options)
     except KeyboardInterrupt as error:
         partial = getattr(error, "partial", None)
         if not isinstance(partial, Branch) or not len(partial):
             raise
         cut, branch = error, partial
     if not given.quiet:
-        with report_beside(given.csv):
+        with report_beside(given.csv, given.json):
             _print_start(model, start)
             _print_branch(branch)
     if given.csv is not None:
-        rows = _write_points(branch, given.csv)
-        _say(given, given.csv, f"written:     {given.csv}, {rows} rows")
+        points = _points(branch)
+        rows = write_rows(points, list(points.values()), given.csv)
+        say(given, f"written:     {given.csv}, {rows} rows")
+    if given.json is not None:
+        write_json(_branch_as_json(branch), given.json)
+        say(given, f"written:     {given.json}")
     if given.store is not None:
-        _say(given, given.csv, f"written:     {given.store}")
+        say(given, f"written:     {given.store}")
     if given.plot is not None:
         _draw_branch(given, branch, model.name)
-        _say(given, given.csv, f"picture:     {given.plot}")
+        say(given, f"picture:     {given.plot}")
     if cut is not None:
         raise KeyboardInterrupt("What was followed is written.")
     return 0
@@ -162,9 +167,7 @@ def _check_outputs(given: argparse.Namespace, paths: Sequence[Path | None], of_p
         check_picture(given.plot)
     else:
         check_needs(given, of_plot, "--plot, the name of a picture")
-    for path in paths:
-        if path is not None:
-            check_target(path)
+    check_targets(*paths)
 
 
 def _check_start(given: argparse.Namespace) -> None:
@@ -190,7 +193,11 @@ def _cycle(given: argparse.Namespace, model: Model, y0: list[float], values: dic
     if given.period is not None:
         period = expression(given.period, list(model.system.params), "--period")
     return limit_cycle(
-        model.system, y0, values, period=period, transient=given.transient, **options_of_run(given)
+        *(model.system, y0, values),
+        period=period,
+        transient=given.transient,
+        progress=wants_progress(given),
+        **options_of_run(given),
     )
 
 
@@ -203,13 +210,6 @@ def _equilibrium(
 def _failed(error: ModelError) -> int:
     print(f"failed: {error}", file=sys.stderr)
     return 1
-
-
-def _say(given: argparse.Namespace, table: Path | None, text: str) -> None:
-    """Print a line of the report, unless it is not wanted; not where the table is printed."""
-    if not given.quiet:
-        with report_beside(table):
-            print(text)
 
 
 def _print_start(model: Model, found: Cycle | Equilibrium) -> None:
@@ -270,17 +270,17 @@ def _as_json(found: Cycle, names: list[str]) -> dict[str, Any]:
         "y0": dict(zip(names, found.y0.tolist(), strict=True)),
         "params": found.params,
         "is_stable": found.is_stable,
-        "multipliers": [[float(value.real), float(value.imag)] for value in found.multipliers],
+        "multipliers": [complex(value) for value in found.multipliers],
         "n_zero": found.n_zero,
-        "monodromy": found.monodromy.tolist(),
+        "monodromy": found.monodromy,
         "modes": [str(mode) for mode in found.modes],
-        "durations": list(map(float, found.itinerary.durations)),
-        "starts": [start.tolist() for start in found.itinerary.starts],
+        "durations": found.itinerary.durations,
+        "starts": found.itinerary.starts,
         "residual": found.residual,
     }
 
 
-def _write_points(branch: Branch, path: Path) -> int:
+def _points(branch: Branch) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = {name: branch.values(name).tolist() for name in branch.quantities}
     columns["stable"] = branch.stable.tolist()
     columns["admissible"] = branch.admissible.tolist()
@@ -288,31 +288,30 @@ def _write_points(branch: Branch, path: Path) -> int:
     columns["modes"] = [
         " ".join(map(str, state.modes)) if isinstance(state, Cycle) else str(state.mode) for state in states
     ]
-    return write_rows(columns, list(columns.values()), path)
+    return columns
+
+
+def _branch_as_json(branch: Branch) -> dict[str, Any]:
+    """Return the points by columns, the special points, and why both sides ended."""
+    return {
+        "parameters": branch.names,
+        "reasons": branch.reasons,
+        "points": _points(branch),
+        "special": [
+            {"code": s.code, "kind": s.kind, "params": s.params, "t": s.t, "surface": s.surface}
+            for s in branch.special
+        ],
+    }
 
 
 def _draw_cycle(given: argparse.Namespace, found: Cycle, names: list[str], title: str) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")  # a picture is written, no window is opened
-    from filippov import plot
-
-    with plot.style(dark=given.dark):
+    def draw(plot: Any) -> Any:
         if len(names) == 1:
-            ax = plot.time_series(found.solution)
-        else:
-            ax = plot.phase(found.solution, *(given.phase or names[:2]))
-        ax.set_title(f"{title}, period {found.period:.6g}")
-        ax.figure.savefig(given.plot)
+            return plot.time_series(found.solution)
+        return plot.phase(found.solution, *(given.phase or names[:2]))
+
+    write_picture(given.plot, given.dark, f"{title}, period {found.period:.6g}", draw)
 
 
 def _draw_branch(given: argparse.Namespace, branch: Branch, title: str) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")  # a picture is written, no window is opened
-    from filippov import plot
-
-    with plot.style(dark=given.dark):
-        ax = plot.branches(branch, given.x, given.y)
-        ax.set_title(title)
-        ax.figure.savefig(given.plot)
+    write_picture(given.plot, given.dark, title, lambda plot: plot.branches(branch, given.x, given.y))

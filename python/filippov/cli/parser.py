@@ -8,8 +8,9 @@ from pathlib import Path
 
 from filippov._core import __version__
 from filippov.cli import commands
+from filippov.cli.exploring import add_app_options, app
 from filippov.cli.following import add_continue_options, add_cycle_options, continue_, cycle
-from filippov.cli.solving import add_run_options
+from filippov.cli.solving import add_run_options, complete_problem
 from filippov.cli.sweeping import add_sweep_options, sweep
 
 __all__ = ["build_parser"]
@@ -28,6 +29,7 @@ first steps:
   filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --store runs --plot diagram.png
   filippov cycle model.py --plot cycle.png
   filippov continue model.py --parameter omega --range 0.2 0.9 --plot branch.png
+  filippov app model.py                      sliders and pictures in the browser
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -74,6 +76,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_sweep(subparsers)
     _add_cycle(subparsers)
     _add_continue(subparsers)
+    _add_app(subparsers)
+    _add_completion(subparsers)
     return parser
 
 
@@ -84,6 +88,7 @@ def _add_list(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -
         description="Name the reference problems, with what happens in them.",
     )
     command.add_argument("text", nargs="?", default="", help="only those with this in their name or note")
+    command.add_argument("--json", action="store_true", help="print names and notes as JSON")
     command.set_defaults(run=commands.list_problems)
 
 
@@ -93,7 +98,8 @@ def _add_demo(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -
         help="solve a reference problem and draw it",
         description="Solve a reference problem: print where it comes from and what happened, and draw it.",
     )
-    command.add_argument("name", metavar="NAME", help="as `filippov list` has it")
+    name = command.add_argument("name", metavar="NAME", help="as `filippov list` has it")
+    name.completer = complete_problem  # type: ignore[attr-defined]
     command.add_argument("--plot", type=Path, metavar="FILE", help="the picture; NAME.png by default")
     command.add_argument("--no-plot", action="store_true", help="draw nothing")
     command.add_argument("--dark", action="store_true", help="light lines on a dark ground")
@@ -137,9 +143,29 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     out.add_argument("--dark", action="store_true", help="light lines on a dark ground")
     out.add_argument("--csv", type=Path, metavar="FILE", help="write times, states and modes; - prints them")
     out.add_argument("--parquet", type=Path, metavar="FILE", help="write them for pandas, Polars, DuckDB")
+    out.add_argument("--json", type=Path, metavar="FILE", help="write all of it as JSON; - prints it")
     out.add_argument("--points", type=int, metavar="N", help="write N equidistant times")
     out.add_argument("--quiet", action="store_true", help="print nothing but warnings and failures")
     command.set_defaults(run=commands.solve)
+
+
+_COMPLETION = """\
+  eval "$(filippov completion bash)"        in ~/.bashrc
+  eval "$(filippov completion zsh)"         in ~/.zshrc, after compinit
+  filippov completion fish | source         in ~/.config/fish/config.fish
+"""
+
+
+def _add_completion(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "completion",
+        help="make the shell complete commands, options and problems",
+        description="Print the lines that make a shell complete commands, options and names of problems.",
+        epilog=_COMPLETION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument("shell", choices=("bash", "zsh", "fish", "tcsh", "powershell"))
+    command.set_defaults(run=commands.print_completion)
 
 
 _SWEEP = """\
@@ -152,6 +178,7 @@ START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations 
 or with a surface as --section, the returns on the attractor are kept, else the state at the end.
 With --store every finished chunk is written at once. A sweep that was stopped, also by kill -9 or by a power
 cut, goes on when the same command is given again; nothing is done twice, the result is the same to the bit.
+Without --csv, --json, --plot and --store the table is printed.
 """
 
 
@@ -213,3 +240,26 @@ def _add_continue(subparsers: argparse._SubParsersAction[argparse.ArgumentParser
     )
     add_continue_options(command)
     command.set_defaults(run=continue_)
+
+
+_APP = """\
+examples:
+  filippov app                               a reference problem
+  filippov app model.py --param F=0:2        the slider of F goes from 0 to 2
+  filippov app dry_friction --t 0 120 --port 8123 --no-browser
+
+The page is served to this computer alone, at 127.0.0.1; the address that is printed has a token, without
+which nothing is answered. Ctrl-C ends it.
+"""
+
+
+def _add_app(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = _command_with_a_model(
+        subparsers,
+        "app",
+        help="explore a model in the browser, with sliders",
+        description="Serve the interactive page of a model to this computer, and open it in the browser.",
+        epilog=_APP,
+    )
+    add_app_options(command)
+    command.set_defaults(run=app)

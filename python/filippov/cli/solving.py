@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from filippov import problems
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model
 
 __all__ = [
     "add_model_options",
     "add_run_options",
+    "complete_model",
+    "complete_problem",
     "initial_state",
     "interval",
     "options_of_run",
     "parameters",
+    "wants_progress",
 ]
 
 
@@ -34,12 +40,20 @@ def add_run_options(command: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--max-steps", type=int, metavar="N", help="give up after N steps")
     how.add_argument("--max-wall-time", metavar="SECONDS", help="give up after that time")
-    how.add_argument("--progress", action="store_true", help="show how far the run is")
+    how.add_argument(
+        "--progress", action="store_true", help="show how far the run is; long runs do by default"
+    )
 
 
-def add_model_options(command: argparse.ArgumentParser) -> None:
+def add_model_options(command: argparse.ArgumentParser, default: str | None = None) -> None:
     """Add the arguments that choose a model, its initial state and its parameters to a command."""
-    command.add_argument("model", metavar="MODEL", help="a Python file, or a problem of `filippov list`")
+    what = "a Python file, or a problem of `filippov list`"
+    if default is None:
+        model = command.add_argument("model", metavar="MODEL", help=what)
+    else:
+        what += f"; {default} by default"
+        model = command.add_argument("model", metavar="MODEL", nargs="?", default=default, help=what)
+    model.completer = complete_model  # type: ignore[attr-defined]
     command.add_argument("--system", metavar="NAME", help="which system of the file; or FILE.py:NAME")
     command.add_argument(
         "--y0", nargs="+", metavar="X", help="initial state: numbers, or NAME=NUMBER for some of them"
@@ -47,6 +61,22 @@ def add_model_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--param", nargs="+", default=[], action="extend", metavar="NAME=VALUE", help="values of parameters"
     )
+
+
+def complete_problem(prefix: str, **_: Any) -> list[str]:
+    """Return the problems whose names begin so, for the completion of a shell."""
+    return [name for name in problems.names() if name.startswith(prefix)]
+
+
+def complete_model(prefix: str, **_: Any) -> list[str]:
+    """Return the Python files and problems whose names begin so, for the completion of a shell."""
+    folder = Path(prefix).parent if prefix else Path()
+    files = [str(path) + ("/" if path.is_dir() else "") for path in folder.glob("*") if _may_be_model(path)]
+    return [name for name in files if name.startswith(prefix)] + complete_problem(prefix)
+
+
+def _may_be_model(path: Path) -> bool:
+    return path.suffix == ".py" or (path.is_dir() and not path.name.startswith("."))
 
 
 def options_of_run(given: argparse.Namespace) -> dict[str, Any]:
@@ -59,9 +89,12 @@ def options_of_run(given: argparse.Namespace) -> dict[str, Any]:
     for name in ("method", "sliding", "max_steps"):
         if getattr(given, name) is not None:
             options[name] = getattr(given, name)
-    if given.progress:
-        options["progress"] = True
     return options
+
+
+def wants_progress(given: argparse.Namespace) -> bool:
+    """Whether a bar is shown: if it is asked for, and on a terminal."""
+    return bool(given.progress or (not given.quiet and sys.stderr.isatty()))
 
 
 def parameters(given: argparse.Namespace, model: Model) -> dict[str, float]:

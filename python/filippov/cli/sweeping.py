@@ -13,14 +13,17 @@ import numpy as np
 from filippov import analysis
 from filippov.analysis.dataset import kinds_of
 from filippov.analysis.grid import memory_of_machine
-from filippov.cli.commands import check_needs, check_picture, check_target, say
+from filippov.cli.commands import check_needs, check_picture, say
 from filippov.cli.expressions import expression
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model, load_model
-from filippov.cli.solving import initial_state, interval, options_of_run
+from filippov.cli.pictures import write_picture
+from filippov.cli.solving import initial_state, interval, options_of_run, wants_progress
 from filippov.cli.tables import write_rows
+from filippov.cli.targets import STDOUT, check_folder, check_targets, write_json
 from filippov.errors import Interrupted
 from filippov.notices import summary
+from filippov.progress import Bar
 
 __all__ = ["add_sweep_options", "sweep"]
 
@@ -43,6 +46,7 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
     out.add_argument(
         "--csv", type=Path, metavar="FILE", help="write one row per return, or per point; - prints"
     )
+    out.add_argument("--json", type=Path, metavar="FILE", help="write the same as JSON; - prints it")
     out.add_argument("--plot", type=Path, metavar="FILE", help="draw the returns over the parameter")
     out.add_argument("--state", metavar="NAME", help="the state to draw; the first by default")
     out.add_argument("--dark", action="store_true", help="light dots on a dark ground")
@@ -64,12 +68,15 @@ def sweep(given: argparse.Namespace) -> int:
             raise Mistake("--plot: one parameter with several values is needed, and --period or --section")
     else:
         check_needs(given, ("state", "dark"), "--plot, the name of a picture")
-    for path in (given.plot, given.csv):
-        if path is not None:
-            check_target(path)
+    if all(target is None for target in (given.csv, given.json, given.plot, given.store)):
+        given.csv = STDOUT
+    check_targets(given.plot, given.csv, given.json)
+    if given.store is not None:
+        check_folder(given.store)
     state = _state(given, model)
     options = options_of_run(given)
-    options["progress"] = given.progress or (not given.quiet and sys.stderr.isatty())
+    watch = _Watch(wants_progress(given))
+    options["progress"] = watch
     for name in ("returns", "transient"):
         if section is None and getattr(given, name) is not None:
             raise Mistake(f"--{name}: is about returns; give --period or --section, or section in the file")
@@ -97,10 +104,35 @@ def sweep(given: argparse.Namespace) -> int:
                 f"What is finished is in {given.store}; the same command goes on."
             ) from None
         cut, result = error, error.partial
+    finally:
+        watch.close()
+    if given.store is not None and watch.before:
+        say(given, f"resumed:  {watch.before} of {int(result.status.size)} points were in {given.store}")
     code = _close(given, result, names[0], state)
     if cut is not None:
         raise KeyboardInterrupt("With --store FOLDER the same command would go on.")
     return code
+
+
+class _Watch:
+    """Shows how far a sweep is, and keeps how many points were there when it began to resume a store."""
+
+    def __init__(self, is_shown: bool) -> None:
+        self._is_shown = is_shown
+        self._bar: Bar | None = None
+        self.before: int | None = None
+
+    def __call__(self, done: int, total: int, failed: int) -> None:
+        if self.before is None:
+            self.before = done
+        if self._is_shown and self._bar is None:
+            self._bar = Bar(total, "points", done=self.before)
+        if self._bar is not None:
+            self._bar.to(done, f"{failed} failed" if failed else "")
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
 
 
 def _values(texts: list[str], where: str, known: list[str]) -> dict[str, Any]:
@@ -183,6 +215,9 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
     if given.csv is not None:
         rows = _write_csv(result, given.csv)
         say(given, f"written:  {given.csv}, {rows} rows")
+    if given.json is not None:
+        write_json(_as_json(result, found), given.json)
+        say(given, f"written:  {given.json}")
     if given.plot is not None:
         _draw(given, result, swept, state or str(_states(result)[0]))
     warning = summary(kinds_of(result["warnings"].values), n_points, "points", "see n_warnings and warnings")
@@ -200,6 +235,22 @@ def _states(result: Any) -> list[str]:
 
 
 def _write_csv(result: Any, path: Path) -> int:
+    columns = _columns(result)
+    return write_rows(columns, [column.tolist() for column in columns.values()], path)
+
+
+def _as_json(result: Any, failures: Any) -> dict[str, Any]:
+    """Return the table by columns, with what it is a table of."""
+    return {
+        **{name: result.attrs[name] for name in ("states", "surfaces", "section") if name in result.attrs},
+        "n_points": int(result.status.size),
+        "failed": {str(reason): len(points) for reason, points in failures.items()},
+        "columns": _columns(result),
+    }
+
+
+def _columns(result: Any) -> dict[str, Any]:
+    """Return the table: one row per return, or per point."""
     if "obs" in result.sizes:
         table = analysis.expand_returns(result)
         columns = {str(name): table[name].values for name in table.variables if table[name].dims == ("obs",)}
@@ -214,17 +265,9 @@ def _write_csv(result: Any, path: Path) -> int:
         }
     known = [*map(str, result.coords), "t", *_states(result)]
     order = [*(name for name in known if name in columns), *sorted(set(columns).difference(known))]
-    columns = {name: columns[name] for name in order}
-    return write_rows(columns, [column.tolist() for column in columns.values()], path)
+    return {name: columns[name] for name in order}
 
 
 def _draw(given: argparse.Namespace, result: Any, swept: str, state: str) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")  # a picture is written, no window is opened
-    from filippov import plot
-
-    with plot.style(dark=given.dark):
-        ax = plot.bifurcation_diagram(result, state, swept)
-        ax.figure.savefig(given.plot)
+    write_picture(given.plot, given.dark, None, lambda plot: plot.bifurcation_diagram(result, state, swept))
     say(given, f"picture:  {given.plot}")

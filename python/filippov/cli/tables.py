@@ -5,28 +5,17 @@ from __future__ import annotations
 import contextlib
 import csv
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from filippov.cli.targets import STDOUT
 from filippov.solution import Solution
 
-__all__ = ["STDOUT", "report_beside", "write_csv", "write_parquet", "write_rows"]
-
-STDOUT = Path("-")
-
-
-@contextlib.contextmanager
-def report_beside(csv_file: Path | None) -> Iterator[None]:
-    """Let what is printed go to the error stream where the table goes to the standard output."""
-    if csv_file != STDOUT:
-        yield
-        return
-    with contextlib.redirect_stdout(sys.stderr):
-        yield
+__all__ = ["write_csv", "write_parquet", "write_rows"]
 
 
 def write_rows(names: Iterable[str], columns: Sequence[Sequence[Any]], path: Path) -> int:

@@ -274,7 +274,7 @@ class Branch:
         variables["residual"] = ("point", np.array([s.residual for s in states]))
         return xarray.Dataset(variables, attrs={"reason": self.reason})
 
-    def plot(self, x: str | None = None, y: str | None = None, ax: Any = None) -> Any:
+    def plot(self, x: str | None = None, y: str | None = None, ax: Any = None, **options: Any) -> Any:
         """Draw one quantity over another, stable parts as lines, unstable ones dashed, special points named.
 
         Parameters
@@ -283,14 +283,16 @@ class Branch:
             Names as in `values`. Default: the parameter, and the period or the first state; for a curve in
             two parameters these.
         ax : matplotlib Axes, optional
+        **options
+            `dark`, `labels`, `legend` of `filippov.plot.branches`.
 
         Returns
         -------
         matplotlib Axes
         """
-        from filippov.plot.branches import draw_branch
+        from filippov.plot.branches import branches
 
-        return draw_branch(self, x, y, ax)
+        return branches(self, x, y, ax, **options)
 
     def __repr__(self) -> str:
         what = "cycles" if isinstance(self.points[0].state, Cycle) else "equilibria"

@@ -21,6 +21,7 @@ from filippov.cycles.probes import PLACES, local_probe, probes_of
 from filippov.cycles.rest import differences
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
+from filippov.progress import BranchBar
 from filippov.scalars import positive
 from filippov.unknown import did_you_mean
 
@@ -132,7 +133,12 @@ class _Extended:
 
 
 def curve_in_two(
-    start: Any, names: tuple[str, ...], bounds: Any, step: float | None, max_points: int
+    start: Any,
+    names: tuple[str, ...],
+    bounds: Any,
+    step: float | None,
+    max_points: int,
+    progress: bool = False,
 ) -> Branch:
     """Return the curve of a special point in two parameters.
 
@@ -165,9 +171,14 @@ def curve_in_two(
             )
     sizes = tuple(high - low for low, high in ranges)
     share = _FIRST_STEP if step is None else positive("step", step) / sizes[0]
-    sides = [_CurveSide(start, names, ranges, sizes, direction) for direction in (-1.0, 1.0)]
-    for side in sides:
-        side.follow(min(share, _LONGEST_STEP), max_points)
+    bar = BranchBar(dict(zip(names, ranges, strict=True))) if progress else None
+    try:
+        sides = [_CurveSide(start, names, ranges, sizes, direction, bar) for direction in (-1.0, 1.0)]
+        for side in sides:
+            side.follow(min(share, _LONGEST_STEP), max_points)
+    finally:
+        if bar is not None:
+            bar.close()
     last = len(sides[0].points) - 1
     points = sides[0].points[::-1] + sides[1].points[1:]
     special = [s._replace(point=max(last - s.point - 1, 0)) for s in sides[0].special[::-1]]
@@ -212,7 +223,9 @@ class _CurveSide:
         ranges: tuple[tuple[float, float], ...],
         sizes: tuple[float, ...],
         direction: float,
+        bar: BranchBar | None,
     ) -> None:
+        self.bar = bar
         self.names, self.ranges, self.sizes, self.code = names, ranges, sizes, start.code
         self.special_start = start
         curve, w = curve_of(start.state, names, sizes)
@@ -259,6 +272,8 @@ class _CurveSide:
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
         state = self.extended.curve.state(self.w, point.error)
         self.points.append(Point(params, state, self.tests))
+        if self.bar is not None:
+            self.bar.add(params)
 
     def follow(self, ds: float, most: int) -> None:
         """Follow the curve to its end."""

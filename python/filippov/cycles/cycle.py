@@ -340,6 +340,7 @@ def limit_cycle(
     *,
     t0: float = 0.0,
     transient: int | None = None,
+    progress: bool = False,
     **options: Any,
 ) -> Cycle:
     """Return the limit cycle that a run from `y0` comes to, or one near a guess.
@@ -369,6 +370,8 @@ def limit_cycle(
     transient : int, optional
         How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0:
         none; `y0` is a guess, and the cycle may be unstable.
+    progress : bool, optional
+        Show a bar for each run on the way to the cycle that takes long.
     **options
         Options of `solve_ivp` for all runs, among them ``rtol`` (default 1e-12) and ``atol`` (1e-13).
 
@@ -404,6 +407,7 @@ def limit_cycle(
         raise InputError(f"transient: a number of periods is needed, not {transient!r}")
     start, t0 = check_y0(y0, states=system._states), check_time(t0)
     motions = Motions(system, len(start), system.parameter_values(params), (), options)
+    motions.watched = "search of the cycle" if progress else ""
     anchor = _check_section(section)
     if isinstance(anchor, Phase):
         t0, period = anchor.offset, anchor.period

@@ -28,6 +28,7 @@ from filippov.errors import InputError, Interrupted
 from filippov.notices import show_summary
 from filippov.options import Options
 from filippov.prepare import Prepared
+from filippov.progress import Progress, report_of_members
 from filippov.scalars import count
 from filippov.sliding_policy import fit_kappa
 
@@ -74,7 +75,8 @@ def lyapunov(
     threads : int, optional
         Number of native threads; by default one per core.
     **options
-        Options of `solve_ivp`.
+        Options of `solve_ivp`; ``progress`` is a bar, or a function of the number of runs done, of all, and
+        of those that failed.
 
     Returns
     -------
@@ -130,7 +132,7 @@ def lyapunov(
     grid = grid_of(system, y0, params)
     check_size(grid, has_store=False)
     span = span_of(t_span, section, number is not None)
-    checked = options_of(options, span, len(grid.states))
+    checked = options_of({**options, "progress": None}, span, len(grid.states))
     state, values = grid.first()
     prepared = prepare_for(system, span[0], state, values)
     refuse_without_derivatives(prepared, (0.0, 1.0))
@@ -141,12 +143,18 @@ def lyapunov(
     anchor = None if section is None else as_section(section)
     work = _Work(system, grid, checked, span, anchor, number, skipped, check_threads(threads))
     rows: list[_Row] = []
+    progress = Progress(options.get("progress"), grid.n_points, unit="runs")
     y0_rows, p_rows = grid.rows(0, grid.n_points)
     for chosen, own in groups_of(system, prepared, span[0], y0_rows, grid.names, p_rows):
         if isinstance(own, Exception):
             rows += [_failed(grid, span[0], "not_prepared", str(own)) for _ in y0_rows[chosen]]
         else:
-            rows += _rows_of(work, own, y0_rows[chosen], p_rows[chosen])
+            report = report_of_members(progress, len(rows)) if progress.is_wanted else None
+            watched = work._replace(options=work.options._replace(progress=report))
+            rows += _rows_of(watched, own, y0_rows[chosen], p_rows[chosen])
+            new = rows[progress.done :]
+            progress.add(len(new), sum(row.status < 0 for row in new))
+    progress.close()
     found = _dataset(xarray, grid, rows, anchor is not None)
     _warn_of_failures(rows)
     where = "a run with System.solve has them in its warnings"

@@ -24,6 +24,7 @@ from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
+from filippov.progress import BranchBar
 from filippov.scalars import count, positive
 from filippov.unknown import did_you_mean
 
@@ -46,7 +47,7 @@ class _Settings(NamedTuple):
     switch: str
     monitors: tuple[Monitor, ...]
     most: int
-    report: Callable[[int, float], None]
+    bar: BranchBar | None
     save: Callable[[], None]
 
     @property
@@ -99,7 +100,7 @@ def continuation(
     store : path, optional
         A file that the branch is written to while it grows; `filippov.cycles.load_branch` reads it.
     progress : bool, optional
-        Print how far the branch is.
+        Show a bar: the share of the range that the branch has covered, its points, rate and time left.
 
     Returns
     -------
@@ -125,7 +126,7 @@ def continuation(
             raise InputError(f"parameter: a name or a pair of names is needed, not {parameter!r}")
         from filippov.cycles.curves import curve_in_two
 
-        return curve_in_two(start, tuple(parameter), bounds, step, max_points=max_points)
+        return curve_in_two(start, tuple(parameter), bounds, step, max_points, progress)
     first = _other_branch(start, parameter) if isinstance(start, Special) else start
     if not isinstance(first, (Cycle, Equilibrium)):
         raise InputError(
@@ -160,6 +161,9 @@ def continuation(
         save()
         interrupt.partial = _joined(sides, settings)  # type: ignore[attr-defined]
         raise
+    finally:
+        if settings.bar is not None:
+            settings.bar.close()
     save()
     return _joined(sides, settings)
 
@@ -188,10 +192,6 @@ def _checked(
         raise InputError(f'detect: "all" or codes among {", ".join(CODES)}, not {detect!r}')
     share = _FIRST_STEP if step is None else positive("step", step) / (high - low)
 
-    def report(count: int, value: float) -> None:
-        if progress:
-            print(f"\r{count} points, {name} = {value:.6g}   ", end="", flush=True)
-
     return _Settings(
         name,
         (low, high),
@@ -200,7 +200,7 @@ def _checked(
         switch,
         monitors_of(monitor, start),
         count("max_points", most),
-        report,
+        BranchBar({name: (low, high)}) if progress else None,
         lambda: None,
     )
 
@@ -300,7 +300,8 @@ class _Side:
         self.here = position
         value = float(position.w[-1])
         self.points.append(Point({self.settings.name: value}, state, position.tests))
-        self.settings.report(len(self.points), value)
+        if self.settings.bar is not None:
+            self.settings.bar.add({self.settings.name: value})
         if len(self.points) % _SAVED_EVERY == 0:
             self.settings.save()
 

@@ -14,6 +14,7 @@ from filippov.derivatives import Back, refuse_without_derivatives
 from filippov.errors import InputError, ModelError
 from filippov.options import Options, check_options
 from filippov.prepare import Prepared, parameter_vector
+from filippov.progress import Report, print_progress
 from filippov.solution import Solution
 from filippov.solve import solve_ivp, solve_quietly
 from filippov.switches import RunWarning
@@ -28,6 +29,8 @@ Mode = tuple[int, ...]
 Guard = tuple[str, int, int]
 
 _DEFAULTS = {"rtol": 1e-12, "atol": 1e-13}
+# Seconds after which a run that is watched has a bar.
+_PATIENCE = 0.3
 # Starts at any place of a cycle are one-sided, and their sides are known from its pieces.
 _OF_DERIVATIVES = ("one_sided", "no_derivative", "no_second_derivative", "against_direction")
 _NOT_HERE = (
@@ -162,6 +165,8 @@ class Motions:
         self._held: tuple[Array, HeldMotions] | None = None
         # Those of all runs; copies add to the same list.
         self.warnings: list[RunWarning] = []
+        # What is computed, in a bar for each long run; none if it is empty.
+        self.watched = ""
         self.use(params)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -260,6 +265,8 @@ class Motions:
 
     def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
         """Run the system with these parameters."""
+        if self.watched:
+            options["progress"] = Report(print_progress(t_span, self.watched, _PATIENCE))
         found = solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
         self.warnings += (w for w in found.warnings if w.code not in _OF_DERIVATIVES)
         return found

@@ -1,7 +1,7 @@
 """Figures of solutions, surfaces and diagrams. Plotting draws and never computes.
 
 Every function takes ``ax=`` and returns it, draws on a light or a dark ground (``dark=``, or `style` around
-many figures), and tells things apart by width, style or marker besides colour.
+many figures), and has a colour of its own for each mode.
 
 Needs Matplotlib: ``pip install matplotlib``.
 """
@@ -13,7 +13,7 @@ from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
 from filippov.plot.phase import phase, phase3d
 from filippov.plot.portrait import portrait
-from filippov.plot.style import style, theme
+from filippov.plot.style import letters, style, theme
 from filippov.plot.surface import surface
 from filippov.plot.time_series import time_series
 
@@ -22,6 +22,7 @@ __all__ = [
     "bifurcation_diagram",
     "branches",
     "hidden_dynamics",
+    "letters",
     "phase",
     "phase3d",
     "poincare_section",

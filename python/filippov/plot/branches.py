@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov.plot.labels import place_labels
-from filippov.plot.style import Theme, draw_legend, new_axes, theme
+from filippov.plot.style import Theme, draw_legend, handle, new_axes, numbered_colour, theme
 
 if TYPE_CHECKING:
     from filippov.cycles.branch import Branch
 
-__all__ = ["branches", "draw_branch"]
+__all__ = ["branches"]
 
 Array = npt.NDArray[np.float64]
 
@@ -48,41 +48,6 @@ class _Part(NamedTuple):
     y: Array
 
 
-def draw_branch(
-    branch: Branch, x: str | None = None, y: str | None = None, ax: Any = None, dark: bool | None = None
-) -> Any:
-    """Draw one quantity of a branch over another; `Branch.plot` calls this.
-
-    Parameters
-    ----------
-    branch : Branch
-        What `continuation` found.
-    x, y : str, optional
-        Names as in `Branch.values`. By default the parameter, and the period of cycles or the first state of
-        equilibria; the two parameters for a curve in two.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure by default.
-    dark : bool, optional
-        Light lines on a dark ground; by default as the `style` around says.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    ImportError
-        If Matplotlib is not installed.
-    InputError
-        If the branch has no such quantity.
-
-    Examples
-    --------
-    >>> axes = fl.plot.branches(branch, "alpha", "x[0]")  # doctest: +SKIP
-    """
-    return branches([branch], x, y, ax, dark)
-
-
 def branches(
     drawn: Branch | Sequence[Branch],
     x: str | None = None,
@@ -90,6 +55,7 @@ def branches(
     ax: Any = None,
     dark: bool | None = None,
     labels: Sequence[str] | None = None,
+    legend: bool | str = True,
 ) -> Any:
     """Draw branches of cycles and equilibria in one axes: a bifurcation diagram.
 
@@ -111,6 +77,8 @@ def branches(
         Light lines on a dark ground; by default as the `style` around says.
     labels : sequence of str, optional
         Names of the branches for the legend.
+    legend : bool or str, optional
+        As for `time_series`.
 
     Returns
     -------
@@ -138,7 +106,7 @@ def branches(
     found = [(list(_parts(branch, x, y)), _marks(branch, x, y)) for branch in every]
     ax = new_axes(ax, (6.4, 4.2), dark)
     chosen = theme(dark)
-    colours = [chosen.colours[k % len(chosen.colours)] for k in range(len(every))]
+    colours = [numbered_colour(k, chosen) or chosen.faint for k in range(len(every))]
     present: set[str] = set()
     for (parts, _), colour in zip(found, colours, strict=True):
         for part in parts:
@@ -149,7 +117,7 @@ def branches(
     ax.set_xlabel(x)
     ax.set_ylabel(y)
     ax.margins(0.05)
-    draw_legend(ax, _handles(present, colours, labels, chosen, every), chosen)
+    draw_legend(ax, _handles(present, colours, labels, chosen, every), chosen, legend)
     place_labels(ax, [mark for _, marks in found for mark in marks], _lines(found), chosen)
     return ax
 
@@ -273,13 +241,10 @@ def _lines(found: Sequence[tuple[list[_Part], Any]]) -> list[Array]:
 def _handles(
     present: set[str], colours: Sequence[str], labels: Sequence[str] | None, chosen: Theme, drawn: Any
 ) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     handles = []
     if labels is not None:
         handles += [
-            Line2D([], [], color=colour, linewidth=1.8, label=label)
-            for colour, label in zip(colours, labels, strict=True)
+            handle(label, color=colour, linewidth=1.8) for colour, label in zip(colours, labels, strict=True)
         ]
     ink = colours[0] if len(colours) == 1 and labels is None else chosen.ink
     two_parameters = all(len(branch.names) == 2 for branch in drawn)
@@ -288,5 +253,5 @@ def _handles(
             continue
         line, width = _STYLES[kind]
         colour = chosen.crossing if kind == _VIRTUAL else ink
-        handles.append(Line2D([], [], color=colour, linestyle=line, linewidth=width, label=kind))
+        handles.append(handle(kind, color=colour, linestyle=line, linewidth=width))
     return handles

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from filippov.plot.style import Theme, draw_legend, new_axes, theme
+from filippov.plot.style import Theme, draw_legend, entries_of, new_axes, numbered_colour, theme
 
 __all__ = ["basins", "bifurcation_diagram", "poincare_section"]
 
@@ -16,7 +16,13 @@ _FEW = 2000
 
 
 def bifurcation_diagram(
-    data: Any, y: str, x: str | None = None, ax: Any = None, dark: bool | None = None
+    data: Any,
+    y: str,
+    x: str | None = None,
+    ax: Any = None,
+    dark: bool | None = None,
+    *,
+    legend: bool | str = True,
 ) -> Any:
     """Draw the returns of every point of a sweep over its parameter: a dot per return.
 
@@ -35,6 +41,8 @@ def bifurcation_diagram(
         Where to draw; a new figure by default.
     dark : bool, optional
         Light dots on a dark ground; by default as the `style` around says.
+    legend : bool or str, optional
+        As for `time_series`; returns with and without sliding are named.
 
     Returns
     -------
@@ -57,13 +65,15 @@ def bifurcation_diagram(
         raise ValueError(f"x: the Dataset has no coordinate {name!r}; it has {', '.join(data.coords)}")
     places = np.repeat(_of_points(data, name), np.asarray(data["row_size"]).ravel())
     ax = new_axes(ax, (7.0, 4.2), dark)
-    _draw_dots(ax, places, values, _slid(data), theme(dark))
+    _draw_dots(ax, places, values, _slid(data), theme(dark), legend)
     ax.set_xlabel(_label(data, name))
     ax.set_ylabel(_label(data, y))
     return ax
 
 
-def poincare_section(data: Any, x: str, y: str, ax: Any = None, dark: bool | None = None) -> Any:
+def poincare_section(
+    data: Any, x: str, y: str, ax: Any = None, dark: bool | None = None, *, legend: bool | str = True
+) -> Any:
     """Draw one variable of the returns against another: a dot per return.
 
     Parameters
@@ -76,6 +86,8 @@ def poincare_section(data: Any, x: str, y: str, ax: Any = None, dark: bool | Non
         Where to draw; a new figure by default.
     dark : bool, optional
         Light dots on a dark ground; by default as the `style` around says.
+    legend : bool or str, optional
+        As for `time_series`; returns with and without sliding are named.
 
     Returns
     -------
@@ -94,14 +106,21 @@ def poincare_section(data: Any, x: str, y: str, ax: Any = None, dark: bool | Non
     """
     across, up = _along_obs(data, x), _along_obs(data, y)
     ax = new_axes(ax, (5.0, 4.4), dark)
-    _draw_dots(ax, across, up, _slid(data), theme(dark))
+    _draw_dots(ax, across, up, _slid(data), theme(dark), legend)
     ax.set_xlabel(_label(data, x))
     ax.set_ylabel(_label(data, y))
     return ax
 
 
-def basins(data: Any, variable: str | None = None, ax: Any = None, dark: bool | None = None) -> Any:
-    """Draw which attractor every initial state goes to: a colour per attractor.
+def basins(
+    data: Any,
+    variable: str | None = None,
+    ax: Any = None,
+    dark: bool | None = None,
+    *,
+    legend: bool | str = True,
+) -> Any:
+    """Draw which attractor every initial state goes to: a colour for each attractor, and its points.
 
     Parameters
     ----------
@@ -113,6 +132,8 @@ def basins(data: Any, variable: str | None = None, ax: Any = None, dark: bool | 
         Where to draw; a new figure by default.
     dark : bool, optional
         On a dark ground; by default as the `style` around says.
+    legend : bool or str, optional
+        As for `time_series`.
 
     Returns
     -------
@@ -143,9 +164,10 @@ def basins(data: Any, variable: str | None = None, ax: Any = None, dark: bool | 
     present = [int(number) for number in np.unique(numbers)]
     colours = {number: _basin_colour(number, chosen) for number in present}
     _draw_cells(ax, np.asarray(data[first]), np.asarray(data[second]), numbers, colours)
-    draw_legend(ax, [_patch(colour, number) for number, colour in colours.items()], chosen)
-    ax.set_xlabel(_label(data, first))
-    ax.set_ylabel(_label(data, second))
+    draw_legend(ax, _patches(colours, chosen), chosen, legend)
+    _draw_attractors(ax, data, field, first, second, colours, chosen)
+    ax.set_xlabel(_label(data, first).removeprefix("initial_"))
+    ax.set_ylabel(_label(data, second).removeprefix("initial_"))
     return ax
 
 
@@ -174,7 +196,7 @@ def _slid(data: Any) -> Any:
     return np.asarray(data["sliding_time"]) > 0.0 if "sliding_time" in data else None
 
 
-def _draw_dots(ax: Any, x: Any, y: Any, slid: Any, chosen: Theme) -> None:
+def _draw_dots(ax: Any, x: Any, y: Any, slid: Any, chosen: Theme, legend: bool | str) -> None:
     size = _LARGE if len(x) <= _FEW else _SMALL
     common = {"linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
     free = np.ones(len(x), dtype=bool) if slid is None else ~slid
@@ -186,10 +208,10 @@ def _draw_dots(ax: Any, x: Any, y: Any, slid: Any, chosen: Theme) -> None:
         if those.any():
             (dots,) = ax.plot(x[those], y[those], color=colour, markersize=size * grown, label=text, **common)
             handles.append(dots)
-    if len(handles) == 2:
-        draw_legend(ax, handles, chosen)
-        for handle in ax.get_legend().legend_handles:
-            handle.set_markersize(8)
+    if slid is not None and legend is not False:
+        draw_legend(ax, handles, chosen, legend)
+        for entry in entries_of(ax):
+            entry.set_markersize(8)
 
 
 def _draw_cells(ax: Any, x: Any, y: Any, numbers: Any, colours: dict[int, str]) -> None:
@@ -212,14 +234,54 @@ def _draw_cells(ax: Any, x: Any, y: Any, numbers: Any, colours: dict[int, str]) 
 def _basin_colour(number: int, chosen: Theme) -> str:
     if number < 0:
         return chosen.faint if number == -1 else chosen.ink
-    return chosen.colours[number % len(chosen.colours)]
+    return numbered_colour(number, chosen) or chosen.crossing
 
 
-def _patch(colour: str, number: int) -> Any:
+def _patches(colours: dict[int, str], chosen: Theme) -> list[Any]:
+    """Return the entries of the legend; attractors after the last colour share one."""
     from matplotlib.patches import Patch
 
     named = {-1: "not known", -2: "failed"}
-    return Patch(color=colour, label=named.get(number, f"attractor {number}"))
+    others = sum(numbered_colour(number, chosen) is None for number in colours)
+    patches = [
+        Patch(color=colour, label=named.get(number, f"attractor {number}"))
+        for number, colour in colours.items()
+        if numbered_colour(max(number, 0), chosen) is not None
+    ]
+    return patches + ([Patch(color=chosen.crossing, label=f"{others} other attractors")] if others else [])
+
+
+def _draw_attractors(
+    ax: Any, data: Any, field: Any, first: str, second: str, colours: dict[int, str], chosen: Theme
+) -> None:
+    """Draw the points of the attractors, where both axes are initial states and lie in the window."""
+    names = [dim.removeprefix("initial_") for dim in (first, second)]
+    if not all(
+        dim.startswith("initial_") and name in data for dim, name in zip((first, second), names, strict=True)
+    ):
+        return
+    numbers = np.asarray(field).ravel()
+    known = np.flatnonzero(numbers >= 0)
+    rows = [np.asarray(data[name]) for name in names]
+    if data[names[0]].dims == ("obs",):
+        counts = np.asarray(data["row_size"]).ravel()
+        starts = np.cumsum(counts) - counts
+        places = {
+            int(numbers[point]): slice(int(starts[point]), int(starts[point] + counts[point]))
+            for point in known[::-1]
+        }
+    else:
+        rows = [row.ravel() for row in rows]
+        places = {int(numbers[point]): slice(int(point), int(point) + 1) for point in known[::-1]}
+    for number, place in places.items():
+        x, y = (row[place] for row in rows)
+        inside = [
+            (row >= float(data[dim].min())) & (row <= float(data[dim].max()))
+            for row, dim in zip((x, y), (first, second), strict=True)
+        ]
+        seen = inside[0] & inside[1]
+        style = {"markerfacecolor": colours[number], "markeredgecolor": chosen.ground, "linestyle": "none"}
+        ax.plot(x[seen], y[seen], marker="o", markersize=6, zorder=3, label=f"_attractor {number}", **style)
 
 
 def _label(data: Any, name: str) -> str:

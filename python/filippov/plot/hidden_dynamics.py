@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from filippov.hidden import HiddenDynamics
 from filippov.hidden import hidden_dynamics as hidden_dynamics_at
-from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, new_axes, palette, theme
+from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, draw_legend, handle, new_axes, theme
 from filippov.sliding_policy import SlidingPolicy
 from filippov.system import System
 
@@ -30,6 +30,7 @@ def hidden_dynamics(
     atol: float = 1e-9,
     ax: Any = None,
     dark: bool | None = None,
+    legend: bool | str = "above",
     **params: float,
 ) -> Any:
     """Draw the hidden dynamics at a point where two surfaces meet.
@@ -48,6 +49,8 @@ def hidden_dynamics(
         Where to draw; a new figure by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
+    legend : bool or str, optional
+        Whether and where the curves are named; as for `time_series`.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def hidden_dynamics(
         hidden = hidden_dynamics_at(system, t, x, before, sliding, atol, **params)
     ax = new_axes(ax, (4.6, 4.6), dark)
     chosen = theme(dark)
-    first, second, motion = palette(dark)[:3]
+    first, second, motion = chosen.colours[:3]
     _draw_square(ax, chosen)
     _draw_arrows(ax, hidden, chosen)
     handles = _draw_curves(ax, hidden, first, second)
@@ -91,16 +94,7 @@ def hidden_dynamics(
     ax.set_yticks([-1, 0, 1])
     ax.set_xlabel(rf"$\lambda$ of {hidden.names[0]}")
     ax.set_ylabel(rf"$\lambda$ of {hidden.names[1]}")
-    legend = ax.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=3,
-        fontsize="small",
-        frameon=False,
-    )
-    for text in legend.get_texts():
-        text.set_color(chosen.ink)
+    draw_legend(ax, handles, chosen, legend)
     return ax
 
 
@@ -135,8 +129,6 @@ def _draw_arrows(ax: Any, hidden: HiddenDynamics, chosen: Theme) -> None:
 
 
 def _draw_curves(ax: Any, hidden: HiddenDynamics, first: str, second: str) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     places = np.linspace(-1.0, 1.0, _GRID)
     u, v = np.meshgrid(places, places)
     handles: list[Any] = []
@@ -146,7 +138,7 @@ def _draw_curves(ax: Any, hidden: HiddenDynamics, first: str, second: str) -> li
     ):
         if g.min() < 0.0 < g.max():
             ax.contour(u, v, g, levels=[0.0], colors=[colour], linewidths=1.6, linestyles=style, zorder=2)
-        handles.append(Line2D([], [], color=colour, linewidth=1.6, linestyle=style, label=name))
+        handles.append(handle(name, color=colour, linewidth=1.6, linestyle=style))
     return handles
 
 

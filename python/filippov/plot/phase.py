@@ -2,27 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-from filippov.plot.pieces import Curves, curves_of, pieces
+from filippov.plot.marks import draw_failure, draw_rests, events_of
+from filippov.plot.pieces import Curves, Track, curves_of
 from filippov.plot.style import (
     SLIDING_WIDTH,
     SMOOTH_WIDTH,
     draw_legend,
+    entries_of,
+    handle,
+    label_of,
     mode_colours,
     mode_handles,
+    mode_title,
     new_axes,
+    own_colour,
     theme,
 )
 from filippov.solution import Solution
 
 __all__ = ["phase", "phase3d"]
 
+# More dots than this would hide the curve: they mark places where something happens.
+_MOST_DOTS = 200
+
 
 def phase(
-    solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None, dark: bool | None = None
+    solution: Solution,
+    i: int | str = 0,
+    j: int | str = 1,
+    ax: Any = None,
+    dark: bool | None = None,
+    *,
+    legend: bool | str = True,
+    label: str | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Any:
-    """Draw state `j` against state `i`: colour is the mode, a heavy line is sliding, a dot is a switch.
+    """Draw state `j` against state `i`: colour is the mode, a heavy line is sliding, a small dot is a switch.
+
+    Where the motion slides in one place of the plane, as a block that sticks, there is a dot whose area is
+    the duration. Open markers are the events of the user, a cross is where a run failed. The curves are exact
+    to a third of a pixel at every zoom.
 
     Parameters
     ----------
@@ -35,6 +57,8 @@ def phase(
         Where to draw; a new figure by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
+    legend, label, units : optional
+        As for `time_series`.
 
     Returns
     -------
@@ -55,7 +79,7 @@ def phase(
     """
     shown = curves_of(solution, [i, j])
     ax = new_axes(ax, (5.6, 4.2), dark)
-    _draw(ax, solution, shown, dark)
+    _draw(ax, solution, shown, _Look(dark, legend, label, units))
     return ax
 
 
@@ -66,6 +90,10 @@ def phase3d(
     k: int | str = 2,
     ax: Any = None,
     dark: bool | None = None,
+    *,
+    legend: bool | str = True,
+    label: str | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Any:
     """Draw three states in space: colour is the mode, a heavy line is sliding, a dot is a switch.
 
@@ -79,6 +107,8 @@ def phase3d(
         Where to draw, an axes with ``projection="3d"``; a new figure by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
+    legend, label, units : optional
+        As for `time_series`.
 
     Returns
     -------
@@ -102,25 +132,55 @@ def phase3d(
     """
     shown = curves_of(solution, [i, j, k])
     ax = new_axes(ax, (6.4, 5.0), dark, projection="3d")
-    _draw(ax, solution, shown, dark)
-    ax.set_zlabel(shown.names[2])
+    _draw(ax, solution, shown, _Look(dark, legend, label, units))
+    ax.set_zlabel(label_of(shown.names[2], units))
     for axis in "xyz":  # seen from the side, more numbers than this run into one another
         ax.locator_params(axis=axis, nbins=4)
     return ax
 
 
-def _draw(ax: Any, solution: Solution, shown: Curves, dark: bool | None) -> None:
-    chosen = theme(dark)
-    parts = list(pieces(solution, shown))
-    colours = mode_colours([mode for mode, _, _ in parts], dark)
-    for mode, _, values in parts:
-        width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
-        order = 2.2 if mode.is_sliding else 2.0
-        ax.plot(*values, color=colours[mode], linewidth=width, zorder=order, solid_capstyle="butt")
-    if len(solution.switches):
+class _Look(NamedTuple):
+    """How a solution is drawn: the arguments of `phase` after the axes."""
+
+    dark: bool | None
+    legend: bool | str
+    label: str | None
+    units: Mapping[str, str] | None
+
+
+def _draw(ax: Any, solution: Solution, shown: Curves, look: _Look) -> None:
+    from filippov.plot.lines import View, add_line
+
+    chosen = theme(look.dark)
+    track = Track(solution, shown, [(1, 2), (2, 3)][: len(shown.names) - 1])
+    by_mode = look.label is None
+    colours = mode_colours(track.modes, look.dark)
+    own = None if look.label is None else own_colour(ax, look.label, chosen)
+    view = View(track, ax)
+    for mode, pieces in track.groups(by_mode):
+        add_line(
+            view,
+            0,
+            pieces,
+            color=own or colours[mode],
+            linewidth=SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH,
+            zorder=2.2 if mode.is_sliding else 2.0,
+            solid_capstyle="butt",
+        )
+    if 0 < len(solution.switches) <= _MOST_DOTS:
         points = shown.beside(solution, solution.switches.t, solution.switches.y_after)
         ax.plot(*points, ".", color=chosen.ink, markersize=3, linestyle="none", zorder=2.4)
-    if solution.surfaces:
-        draw_legend(ax, mode_handles(colours), chosen)
-    ax.set_xlabel(shown.names[0])
-    ax.set_ylabel(shown.names[1])
+    handles = entries_of(ax) if look.label is not None else []
+    if solution.surfaces and by_mode:
+        handles += mode_handles(colours, look.dark)
+    if look.label is not None:
+        handles.append(handle(look.label, color=own, linewidth=SMOOTH_WIDTH))
+    handles += draw_rests(ax, track, colours, own, chosen)
+    for name, marker, times, states in events_of(solution):
+        style = {"markerfacecolor": "none", "markeredgecolor": chosen.ink, "linestyle": "none", "label": name}
+        points = shown.beside(solution, times, states)
+        handles += ax.plot(*points, marker=marker, markersize=5, zorder=3, **style)
+    handles += draw_failure(ax, track, chosen)
+    draw_legend(ax, handles, chosen, look.legend, mode_title(solution.surfaces) if by_mode else None)
+    ax.set_xlabel(label_of(shown.names[0], look.units))
+    ax.set_ylabel(label_of(shown.names[1], look.units))

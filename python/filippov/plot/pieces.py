@@ -1,49 +1,152 @@
-"""The pieces of a solution that are drawn: points of every segment, and which states and outputs."""
+"""What is drawn of a solution: points of all of its segments, and which states and outputs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from filippov.modes import Mode
+from filippov.polylines import Polyline, Project, refined
 from filippov.solution import Solution
 
-__all__ = ["Curves", "curves_of", "pieces"]
+__all__ = ["Curves", "Track", "curves_of"]
 
 Array = npt.NDArray[np.float64]
 
-# Points over the whole interval; a step is much longer than a pixel, so straight lines would show.
-_POINTS = 2000
-# Points of a segment at least, where there are few segments and where there are many.
-_FEWEST, _FEWEST_OF_MANY, _MANY = 40, 8, 500
+# Straight lines of the first drawing are this near to the curve, in shares of the ranges of the picture.
+_COARSE = 1e-3
+# Intervals of a step to begin with: a step of high order bends a few times.
+_PARTS_OF_A_STEP = 3
 
 
-def pieces(solution: Solution, shown: Curves) -> Iterator[tuple[Mode, Array, Array]]:
-    """Yield the mode, the times (k,) and the curves (m, k) of every segment, both ends included.
+class Track:
+    """The curves of a solution that one axes shows, with as many points as a view of them needs.
 
-    Without dense output the points kept in ``solution.t`` are used.
+    Parameters
+    ----------
+    solution : Solution
+        What is drawn.
+    shown : Curves
+        Which states and outputs.
+    planes : tuple of tuple of int
+        The plane curves: pairs of rows, of which 0 is the time and k + 1 the curve k of `shown`.
+
+    Attributes
+    ----------
+    modes : list of Mode
+        The mode of each piece.
+    base : Polyline
+        Points that agree with the curves to a thousandth of their ranges.
     """
-    if not len(solution.segments):
-        yield Mode(), solution.t, shown.kept(solution, slice(None))
-        return
-    fewest = _FEWEST if len(solution.segments) < _MANY else _FEWEST_OF_MANY
-    length = abs(solution.segments[-1].t_end - solution.segments[0].t_start) or 1.0
-    for segment in solution.segments:
-        if solution.sol is None:
-            first, last = sorted((segment.t_start, segment.t_end))
-            inside = (solution.t >= first) & (solution.t <= last)
-            yield segment.mode, solution.t[inside], shown.kept(solution, inside)
-            continue
-        count = max(fewest, int(_POINTS * abs(segment.duration) / length))
-        times = np.linspace(segment.t_start, segment.t_end, count)
-        values = shown.at(solution, times)
-        if segment.t_end != segment.t_start:
-            # The end belongs to this segment: a reset at it must not be drawn as a ramp.
-            values[:, -1] = shown.at(solution, times[-1:], "left")[:, 0]
-        yield segment.mode, times, values
+
+    def __init__(self, solution: Solution, shown: Curves, planes: Sequence[tuple[int, int]]) -> None:
+        self.solution, self.shown, self.planes = solution, shown, tuple(planes)
+        segments = solution.segments
+        self.modes: list[Mode] = list(segments.mode) if len(segments) else [Mode()]
+        self.spans: Array = (
+            np.column_stack([segments.t_start, segments.t_end])
+            if len(segments)
+            else np.array([[solution.t[0], solution.t[-1]]] if len(solution.t) else np.empty((0, 2)))
+        )
+        self._is_function = solution.sol is not None and len(segments) > 0
+        self.base = self._refined_base(self._knots()) if self._is_function else self._kept()
+
+    def refined(self, project: Project, tolerance: float, windows: Array) -> Polyline:
+        """Return points as dense as the view of `project` needs; see `filippov.polylines.refined`."""
+        if not self._is_function:
+            return self.base
+        return refined(self.base, self._at, project, tolerance, windows)
+
+    def rows(self, t: Array, values: Array) -> Array:
+        """Return the plane curves, shape (c, 2, k)."""
+        every = np.concatenate([t[None], values])
+        return np.array([every[list(pair)] for pair in self.planes]).reshape(len(self.planes), 2, len(t))
+
+    def groups(self, by_mode: bool) -> list[tuple[Mode, npt.NDArray[np.bool_]]]:
+        """Return the pieces that are drawn alike: of one mode, or those that slide and those that do not.
+
+        Each group is a mode of it and a mask of the pieces; groups that slide come last.
+        """
+        keys: dict[Any, list[int]] = {}
+        for number, mode in enumerate(self.modes):
+            keys.setdefault((mode.is_sliding, mode if by_mode else None), []).append(number)
+        found = []
+        for (_, _), numbers in sorted(keys.items(), key=lambda item: item[0][0]):
+            mask = np.zeros(len(self.modes), dtype=bool)
+            mask[numbers] = True
+            found.append((self.modes[numbers[0]], mask))
+        return found
+
+    def _at(self, times: Array) -> Array:
+        return self.shown.at(self.solution, times)
+
+    def _refined_base(self, knots: Polyline) -> Polyline:
+        size = _sizes(self.rows(knots.t, knots.values))
+        return refined(knots, self._at, lambda t, x: self.rows(t, x) / size[:, :, None], _COARSE)
+
+    def _knots(self) -> Polyline:
+        """Return the ends of all pieces, and some points in every step."""
+        steps, pieces = self._steps()
+        inner = np.diff(pieces) == 0
+        shares = np.arange(_PARTS_OF_A_STEP) / _PARTS_OF_A_STEP
+        length = np.where(np.append(inner, False), np.append(np.diff(steps), 0.0), 0.0)
+        times = steps[:, None] + length[:, None] * shares
+        kept = np.ones(times.shape, dtype=bool)
+        kept[:, 1:] = (length != 0.0)[:, None]
+        t, piece = times[kept], np.repeat(pieces, kept.sum(axis=1))
+        values = self._at(t)
+        # The end belongs to its piece: a reset at it must not be drawn as a ramp.
+        ends = np.append(np.flatnonzero(np.diff(piece)), len(piece) - 1)
+        lasts = ends[self.spans[piece[ends], 0] != self.spans[piece[ends], 1]]
+        values[:, lasts] = self.shown.at(self.solution, t[lasts], "left")
+        return Polyline(t, values, piece)
+
+    def _steps(self) -> tuple[Array, npt.NDArray[np.int64]]:
+        """Return times about as dense as the steps of the solver, both ends of every piece among them."""
+        starts, ends = self.spans.T
+        sign = -1.0 if ends[-1] < starts[0] else 1.0
+        n_steps = float(self.solution.stats.get("n_steps", 0) or 0)
+        whole = abs(ends[-1] - starts[0]) or 1.0
+        parts = 1 + (n_steps * np.abs(ends - starts) / whole).astype(np.int64)
+        pieces = np.repeat(np.arange(len(starts)), parts + 1)
+        first = np.repeat(np.cumsum(parts + 1) - (parts + 1), parts + 1)
+        share = (np.arange(len(pieces)) - first) / np.repeat(parts, parts + 1)
+        times = np.repeat(starts, parts + 1) * (1.0 - share) + np.repeat(ends, parts + 1) * share
+        lasts = np.cumsum(parts + 1) - 1
+        times[lasts] = ends
+        # The times that were kept are the ends of the steps, unless the user chose others.
+        own = self.solution.t
+        of_own = np.searchsorted(sign * starts, sign * own, side="right") - 1
+        inside = (of_own >= 0) & (sign * own > sign * starts[of_own]) & (sign * own < sign * ends[of_own])
+        times = np.concatenate([times, own[inside]])
+        pieces = np.concatenate([pieces, of_own[inside]])
+        order = np.lexsort((sign * times, pieces))
+        return times[order], pieces[order]
+
+    def _kept(self) -> Polyline:
+        """Return the points that were kept; without dense output there are no others."""
+        t = self.solution.t
+        if not len(self.solution.segments):
+            return Polyline(t, self.shown.kept(self.solution, slice(None)), np.zeros(len(t), dtype=np.int64))
+        parts = []
+        for number, (first, last) in enumerate(np.sort(self.spans, axis=1)):
+            inside = (t >= first) & (t <= last)
+            values = self.shown.kept(self.solution, inside)
+            parts.append(Polyline(t[inside], values, np.full(len(values.T), number, dtype=np.int64)))
+        return Polyline(
+            np.concatenate([part.t for part in parts]),
+            np.concatenate([part.values for part in parts], axis=1),
+            np.concatenate([part.piece for part in parts]),
+        )
+
+
+def _sizes(rows: Array) -> Array:
+    """Return the ranges of plane curves, shape (c, 2); 1 where there is none."""
+    found = np.ma.masked_invalid(rows)
+    return np.asarray(np.ma.filled(np.ma.masked_equal(np.ptp(found, axis=2), 0.0), 1.0), dtype=np.float64)
 
 
 class Curves(NamedTuple):

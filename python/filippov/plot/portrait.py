@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov.plot.pieces import curves_of, pieces
-from filippov.plot.style import Theme, draw_legend, new_axes, theme
+from filippov.plot.pieces import Track, curves_of
+from filippov.plot.style import Theme, draw_legend, entries_of, new_axes, theme
 from filippov.plot.surface import surface
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def portrait(
     cycles: Sequence[Cycle] = (),
     manifolds: Sequence[ManifoldCurve] = (),
     dark: bool | None = None,
-    legend: bool = True,
+    legend: bool | str = True,
     **options: Any,
 ) -> Any:
     """Draw the phase portrait of a planar system.
@@ -62,8 +62,8 @@ def portrait(
         Curves that `fl.manifold` found, to draw.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
-    legend : bool, optional
-        Whether the signs are named beside the axes.
+    legend : bool or str, optional
+        Whether and where the signs are named; as for `time_series`.
     **options
         Options of `phase_portrait`: `starts` of trajectories, `duration`, `density` of streamlines, `points`.
 
@@ -111,8 +111,7 @@ def portrait(
     handles += _draw_equilibria(ax, found, chosen)
     ax.set_xlabel(found.labels[0])
     ax.set_ylabel(found.labels[1])
-    if legend:
-        draw_legend(ax, _named(ax, handles), chosen)
+    draw_legend(ax, _named(ax, handles), chosen, legend)
     return ax
 
 
@@ -176,19 +175,15 @@ def _draw_arrow(
 def _draw_trajectories(
     ax: Any, runs: Sequence[Solution], colour: str, width: float, label: str, order: float
 ) -> None:
+    from filippov.plot.lines import View, add_line
+
     for run in runs:
         if not len(run.t):
             continue
-        shown = curves_of(run, None)
-        for _, _, values in pieces(run, shown):
-            ax.plot(
-                *values,
-                color=colour,
-                linewidth=width,
-                solid_capstyle="butt",
-                zorder=order,
-                label=label,
-            )
+        track = Track(run, curves_of(run, None), [(1, 2)])
+        every = np.ones(len(track.modes), dtype=bool)
+        style = {"color": colour, "linewidth": width, "zorder": order, "label": label}
+        add_line(View(track, ax), 0, every, solid_capstyle="butt", **style)
 
 
 def _draw_sliding(ax: Any, found: Portrait, chosen: Theme) -> None:
@@ -247,8 +242,7 @@ def _draw_equilibria(ax: Any, found: Portrait, chosen: Theme) -> list[Any]:
 
 def _named(ax: Any, handles: Sequence[Any]) -> list[Any]:
     """Return the entries of the legend: those of surfaces and lines, then of the signs, each once."""
-    known = ax.get_legend()
-    found = list(known.legend_handles) if known is not None else []
+    found = entries_of(ax)
     for label in ("trajectory", "cycle", "manifold"):
         found += [line for line in ax.lines if line.get_label() == label][:1]
     texts = {handle.get_label() for handle in found}

@@ -1,7 +1,8 @@
-"""Colours, line widths and the lazy import of Matplotlib, shared by all figures.
+"""Colours, line widths, legends, letters of panels, and the lazy import of Matplotlib, for all figures.
 
-Colours: Okabe and Ito, Color Universal Design (2008); distinguishable with every kind of colour blindness.
-What colour says is said by width, line style or marker too, so that it survives a print in black and white.
+The first seven colours are those of Okabe and Ito, Color Universal Design (2008), which people with every
+kind of colour blindness can distinguish. The next seven are darker, seven more are lighter. No colour is used
+twice.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from itertools import product
+from string import ascii_lowercase
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 from filippov.modes import Mode
 
@@ -20,11 +23,17 @@ __all__ = [
     "Theme",
     "apply_theme",
     "draw_legend",
+    "entries_of",
+    "handle",
     "import_pyplot",
+    "label_of",
+    "letters",
     "mode_colours",
     "mode_handles",
+    "mode_title",
     "new_axes",
-    "palette",
+    "numbered_colour",
+    "own_colour",
     "style",
     "theme",
 ]
@@ -35,7 +44,12 @@ _VERMILION = "#D55E00"
 
 SMOOTH_WIDTH = 1.2
 SLIDING_WIDTH = 3.0
-_MOST_MODES_NAMED = 8
+# How far colours after the seventh are mixed with the ink, and those after the fourteenth with the ground.
+_SHADES = (0.0, 0.45, 0.5)
+# A legend with more entries has two columns.
+_ENTRIES_OF_A_COLUMN = 12
+# Surfaces are named above the modes where the names are short.
+_MOST_SURFACES_NAMED, _MOST_LETTERS = 6, 32
 
 
 class Theme(NamedTuple):
@@ -63,13 +77,16 @@ DARK = Theme(
     ground="#16181D",
     ink="#E8E8E8",
     faint="#606468",
-    colours=(_SKY, *_MIDDLE, "#3D9BDC", "#FF7B39", _YELLOW),
+    colours=(_SKY, *_MIDDLE, "#8F7BEE", "#FF7B39", _YELLOW),
     attracting="#BFC4F0",
     repelling="#FF7B39",
     crossing="#84888C",
 )
 
 _dark_now: ContextVar[bool] = ContextVar("filippov_plot_dark", default=False)
+
+# The labels of solutions that an axes has, in their order.
+_labelled: WeakKeyDictionary[Any, list[str]] = WeakKeyDictionary()
 
 # What makes a figure fit for print: letters of the size of a caption, fonts that stay text.
 _PRINT = {
@@ -80,12 +97,20 @@ _PRINT = {
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "axes.unicode_minus": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "lines.linewidth": SMOOTH_WIDTH,
+    "legend.frameon": False,
+    "legend.fontsize": "small",
 }
 
 
 @contextmanager
 def style(dark: bool = False, **changes: Any) -> Iterator[Theme]:
     """Draw everything inside a ``with`` block on a light or on a dark ground, ready for print.
+
+    Also a decorator of a function that draws. What you draw yourself has the same colours and frames.
 
     Parameters
     ----------
@@ -121,6 +146,7 @@ def style(dark: bool = False, **changes: Any) -> Iterator[Theme]:
         "axes.edgecolor": chosen.ink,
         "xtick.color": chosen.ink,
         "ytick.color": chosen.ink,
+        "axes.prop_cycle": pyplot.cycler(color=chosen.colours),
         **{_setting(pyplot, name): value for name, value in changes.items()},
     }
     token = _dark_now.set(dark)
@@ -174,53 +200,165 @@ def new_axes(ax: Any, size: tuple[float, float], dark: bool | None, projection: 
     return ax
 
 
-def palette(dark: bool | None) -> list[str]:
-    """Return the colours in the order of use."""
-    return list(theme(dark).colours)
+def numbered_colour(number: int, chosen: Theme) -> str | None:
+    """Return a colour that no other number has; None if there are no more."""
+    level, place = divmod(number, len(chosen.colours))
+    if level >= len(_SHADES):
+        return None
+    from matplotlib.colors import to_hex, to_rgb
+
+    other = to_rgb(chosen.ground if level == 2 else chosen.ink)
+    share = _SHADES[level]
+    mixed = [(1.0 - share) * a + share * b for a, b in zip(to_rgb(chosen.colours[place]), other, strict=True)]
+    return str(to_hex(mixed)) if level else chosen.colours[place]
 
 
 def mode_colours(modes: Sequence[Mode], dark: bool | None) -> dict[Mode, str]:
     """Return a colour for every mode that occurs; regions come first, and + before -, whatever the run.
 
-    With one surface or two a mode has the same colour in every figure.
+    With one surface or two a mode has the same colour in every figure. From the 22nd mode on all have the
+    faint ink, and the legend says so.
     """
-    colours = palette(dark)
+    chosen = theme(dark)
     present = sorted(set(modes), key=_rank)
     numbered = present
     if present and len(present[0]) in (1, 2):
         numbered = sorted(map(Mode, product((1, -1, 0), repeat=len(present[0]))), key=_rank)
-    return {mode: colours[numbered.index(mode) % len(colours)] for mode in present}
+    return {mode: numbered_colour(numbered.index(mode), chosen) or chosen.faint for mode in present}
 
 
 def _rank(mode: Mode) -> tuple[int, tuple[int, ...]]:
     return mode.codimension, tuple(-entry for entry in mode)
 
 
-def mode_handles(colours: dict[Mode, str]) -> list[Any]:
-    """Return the entries of a legend that name the modes, not more of them than a reader takes in."""
+def own_colour(ax: Any, label: str, chosen: Theme) -> str:
+    """Return the colour of a labelled solution: the next one of the axes.
+
+    Raises
+    ------
+    ValueError
+        If all colours are taken.
+    """
+    known = _labelled.setdefault(ax, [])
+    if label not in known:
+        known.append(label)
+    colour = numbered_colour(known.index(label), chosen)
+    if colour is None:
+        raise ValueError(f"label: {len(known)} solutions cannot be distinguished in one axes")
+    return colour
+
+
+def entries_of(ax: Any) -> list[Any]:
+    """Return the entries of the legend that an axes has."""
+    known = ax.get_legend()
+    return list(known.legend_handles) if known is not None else []
+
+
+def handle(label: str, **style: Any) -> Any:
+    """Return an entry of a legend: a line, or with ``linestyle="none"`` a marker."""
     from matplotlib.lines import Line2D
 
+    return Line2D([], [], label=label, **style)
+
+
+def mode_handles(colours: dict[Mode, str], dark: bool | None) -> list[Any]:
+    """Return the entries of a legend that name the modes; those without a colour of their own share one."""
+    faint = theme(dark).faint
     handles = []
-    for mode, colour in list(colours.items())[:_MOST_MODES_NAMED]:
-        width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
-        label = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
-        handles.append(Line2D([], [], color=colour, linewidth=width, label=label))
-    if len(colours) > _MOST_MODES_NAMED:
-        left_out = len(colours) - _MOST_MODES_NAMED
-        handles.append(Line2D([], [], color="none", label=f"... {left_out} more modes"))
+    for mode, colour in colours.items():
+        if colour != faint:
+            width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
+            text = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
+            handles.append(handle(text, color=colour, linewidth=width))
+    n_others = len(colours) - len(handles)
+    if n_others:
+        handles.append(handle(f"{n_others} other modes", color=faint, linewidth=SMOOTH_WIDTH))
     return handles
 
 
-def draw_legend(ax: Any, handles: list[Any], chosen: Theme) -> None:
-    """Draw a legend beside the axes, where it covers nothing."""
-    if not handles:
+def mode_title(surfaces: Sequence[str]) -> str | None:
+    """Return what the signs of a mode stand for, if the surfaces have short names."""
+    is_short = all(len(name) <= _MOST_LETTERS for name in surfaces)
+    if not surfaces or len(surfaces) > _MOST_SURFACES_NAMED or not is_short:
+        return None
+    together = ", ".join(surfaces)
+    return "signs of " + (together if len(together) <= _MOST_LETTERS else ",\n".join(surfaces))
+
+
+def draw_legend(
+    ax: Any, handles: list[Any], chosen: Theme, legend: bool | str = True, title: str | None = None
+) -> None:
+    """Draw a legend: beside the axes, where it covers nothing; or where the user wants it.
+
+    Parameters
+    ----------
+    legend : bool or str
+        ``True`` or ``"beside"``, ``"below"`` or ``"above"`` the axes, or a place in it for Matplotlib.
+    """
+    if not handles or legend is False:
         return
-    beside = 1.12 if hasattr(ax, "zaxis") else 1.0  # in space numbers stand beyond the axes
-    legend = ax.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(beside, 1.0), fontsize="small", frameon=False
+    handles = list({entry.get_label(): entry for entry in handles}.values())
+    place: dict[str, Any] = {"loc": legend, "ncols": 1 + (len(handles) > _ENTRIES_OF_A_COLUMN)}
+    if legend is True or legend == "beside":
+        beside = 1.12 if hasattr(ax, "zaxis") else 1.0  # in space numbers stand beyond the axes
+        place |= {"loc": "upper left", "bbox_to_anchor": (beside, 1.0)}
+    elif legend == "below":
+        place |= {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": min(4, len(handles))}
+    elif legend == "above":
+        place |= {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": min(4, len(handles))}
+    elif legend not in _places_of_legends():
+        known = ", ".join(_places_of_legends())
+        raise ValueError(f'legend: True, False, "beside", "below", "above" or one of {known}, not {legend!r}')
+    drawn = ax.legend(
+        handles=handles, title=title, fontsize="small", title_fontsize="small", frameon=False, **place
     )
-    for text in legend.get_texts():
+    drawn.get_title().set_color(chosen.ink)
+    drawn.set_alignment("left")
+    for text in drawn.get_texts():
         text.set_color(chosen.ink)
+
+
+def _places_of_legends() -> list[str]:
+    from matplotlib.legend import Legend
+
+    return list(Legend.codes)
+
+
+def label_of(name: str, units: Any) -> str:
+    """Return the label of an axis: a name, with its unit if there is one."""
+    unit = (units or {}).get(name)
+    return f"{name} [{unit}]" if unit else name
+
+
+def letters(axes: Any, start: str = "a") -> None:
+    """Write (a), (b), ... above the upper left corners of panels, as papers refer to them.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes, or array or sequence of these
+        The panels, in the order of the letters.
+    start : str, optional
+        The first letter.
+
+    Examples
+    --------
+    >>> figure, axes = pyplot.subplots(1, 2)  # doctest: +SKIP
+    >>> fl.plot.letters(axes)  # doctest: +SKIP
+    """
+    panels = list(axes.flat) if hasattr(axes, "flat") else list(axes) if hasattr(axes, "__iter__") else [axes]
+    first = ascii_lowercase.index(start)
+    for ax, letter in zip(panels, ascii_lowercase[first:], strict=False):
+        ax.annotate(
+            f"({letter})",
+            (0.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(-6.0, 5.0),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            fontweight="bold",
+            color=ax.xaxis.label.get_color(),
+        )
 
 
 def apply_theme(axes: Any, chosen: Theme) -> None:

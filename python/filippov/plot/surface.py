@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from filippov.plot.style import Theme, draw_legend, new_axes, theme
+from filippov.plot.style import Theme, draw_legend, entries_of, handle, new_axes, theme
 from filippov.sheets import SurfaceParts
 
 __all__ = ["surface"]
@@ -23,7 +23,7 @@ _WIDTHS = {"attracting": 2.0, "repelling": 2.0, "crossing": 1.4}
 _OPACITY = {"attracting": 0.25, "repelling": 0.3, "crossing": 0.15}
 
 
-def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legend: bool = True) -> Any:
+def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legend: bool | str = True) -> Any:
     """Draw a surface: the parts that attract, repel and are crossed differ in colour and in style.
 
     Parameters
@@ -34,8 +34,8 @@ def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legen
         Where to draw, with ``projection="3d"`` for three states; a new figure by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
-    legend : bool, optional
-        Whether the parts are named beside the axes, after what stands there already.
+    legend : bool or str, optional
+        Whether and where the parts are named, after what stands there already; as for `time_series`.
 
     Returns
     -------
@@ -69,10 +69,9 @@ def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legen
         ax.set_ylabel(parts.labels[1])
         if in_space:
             ax.set_zlabel(parts.labels[2])
-    if legend:
-        known = ax.get_legend()
-        handles = list(known.legend_handles) if known is not None else []
-        draw_legend(ax, handles + _handles(parts, chosen, in_space), chosen)
+    if legend is not False:
+        title = ax.get_legend().get_title().get_text() if ax.get_legend() is not None else None
+        draw_legend(ax, entries_of(ax) + _handles(parts, chosen, in_space), chosen, legend, title)
     return ax
 
 
@@ -125,7 +124,6 @@ def _draw_triangles(ax: Any, parts: SurfaceParts, chosen: Theme) -> None:
 
 
 def _handles(parts: SurfaceParts, chosen: Theme, in_space: bool) -> list[Any]:
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     handles: list[Any] = []
@@ -137,14 +135,6 @@ def _handles(parts: SurfaceParts, chosen: Theme, in_space: bool) -> list[Any]:
         if in_space:
             handles.append(Patch(color=_colour(kind, chosen), alpha=_OPACITY.get(kind, 0.15), label=label))
         else:
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    color=_colour(kind, chosen),
-                    linestyle=_STYLES.get(kind, ":"),
-                    linewidth=_WIDTHS.get(kind, 1.0),
-                    label=label,
-                )
-            )
+            style = {"linestyle": _STYLES.get(kind, ":"), "linewidth": _WIDTHS.get(kind, 1.0)}
+            handles.append(handle(label, color=_colour(kind, chosen), **style))
     return handles

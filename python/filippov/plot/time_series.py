@@ -1,42 +1,66 @@
-"""States over time, coloured by mode, with a strip of modes below."""
+"""States over time, coloured by mode, with a strip of modes at the lower edge."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from filippov.modes import Mode
-from filippov.plot.pieces import Curves, curves_of, pieces
+from filippov.plot.marks import draw_failure, events_of
+from filippov.plot.pieces import Curves, Track, curves_of
 from filippov.plot.style import (
     SLIDING_WIDTH,
     SMOOTH_WIDTH,
     Theme,
     draw_legend,
+    entries_of,
+    handle,
+    import_pyplot,
+    label_of,
     mode_colours,
     mode_handles,
+    mode_title,
     new_axes,
-    palette,
+    numbered_colour,
+    own_colour,
     theme,
 )
 from filippov.solution import Solution
 
 __all__ = ["time_series"]
 
+# Line styles and markers of the states in one axes: each pair occurs once.
 _LINE_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
-_EVENT_MARKERS = "ovsD^"
+_STATE_MARKERS = ("", "o", "s", "^", "D", "v")
+_MARKERS_OF_A_CURVE = 9
+# States up to which all are drawn in one axes, if the caller does not say otherwise.
+_MOST_IN_ONE = 4
 _MOST_TICKS = 200
-# Heights, as shares of the axes: of the strip, and of what is kept free for it and for its names.
+# Heights, as shares of the axes: of the strip, where the motion slides, and of what is free around curves.
 _STRIP, _STRIP_SLIDING, _FREE = 0.02, 0.04, 0.1
 # A name stands in the strip where a piece is this much of the width per letter.
 _WIDTH_OF_A_LETTER = 0.014
 
 
-def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
-    """Draw states over time: colour is the mode, a heavy line is sliding, line styles tell states apart.
+def time_series(
+    solution: Solution,
+    ax: Any = None,
+    states: Any = None,
+    dark: bool | None = None,
+    *,
+    layout: str | None = None,
+    legend: bool | str = True,
+    label: str | None = None,
+    strip: bool = True,
+    units: Mapping[str, str] | None = None,
+) -> Any:
+    """Draw states over time: colour is the mode, a heavy line is sliding, line styles distinguish the states.
 
-    A strip along the lower edge names the modes, higher where the motion slides; ticks at the upper edge are
-    switches; open markers on the curves are the events of the user.
+    A strip along the lower edge shows the modes, higher where the motion slides; ticks at the upper edge are
+    switches; open markers on the curves are the events of the user; a cross is where a run failed. The curves
+    are exact to a third of a pixel at every zoom and on every scale of the axes.
 
     Parameters
     ----------
@@ -48,17 +72,31 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
         Which states, and outputs and discrete states of the system by their names; all states by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
+    layout : {"one", "rows"}, optional
+        All states in one axes, or one below the other. Default: one axes for up to four states or where `ax`
+        is given, else rows.
+    legend : bool or str, optional
+        ``True`` or ``"beside"``, ``"below"`` or ``"above"`` the axes; or a place in it, such as ``"best"``.
+        In a figure of several axes use ``layout="constrained"``, which keeps room for what is beside.
+    label : str, optional
+        Name of this solution, for several in one axes. Its curves then have one colour, the next of the
+        axes, and there is no strip.
+    strip : bool, optional
+        Whether the strip of modes and the ticks are drawn.
+    units : dict of str to str, optional
+        Units by the names of the states; ``"t"`` is the time.
 
     Returns
     -------
-    matplotlib.axes.Axes
+    matplotlib.axes.Axes, or ndarray of these
+        An array for ``layout="rows"``.
 
     Raises
     ------
     ImportError
         If Matplotlib is not installed.
     ValueError
-        If a state or output does not exist.
+        If a state or output does not exist, or more states are to be in one axes than can be distinguished.
 
     Examples
     --------
@@ -66,55 +104,114 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     >>> problem = fl.problems.get("dieci_lopez_6_1")
     >>> axes = fl.plot.time_series(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
+    if layout not in (None, "one", "rows"):
+        raise ValueError(f'layout: "one" or "rows" is needed, not {layout!r}')
     shown = curves_of(solution, states)
+    look = _Look(dark, legend, label, strip, units)
+    if layout == "rows" or (layout is None and ax is None and len(shown.names) > _MOST_IN_ONE):
+        if ax is not None:
+            raise ValueError('layout: "rows" makes axes of its own; leave ax= away')
+        return _draw_rows(solution, shown, look)
     ax = new_axes(ax, (7.0, 3.6), dark)
-    chosen = theme(dark)
-    parts = list(pieces(solution, shown))
-    colours = mode_colours([mode for mode, _, _ in parts], dark)
-    if not solution.surfaces:  # nothing to tell apart by mode: then colour tells the states apart
-        _draw_smooth(ax, parts, dark)
-    else:
-        for mode, times, values in parts:
-            for order, row in enumerate(values):
-                width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
-                style = _line_style(order, width)
-                ax.plot(
-                    times,
-                    row,
-                    color=colours[mode],
-                    linewidth=width,
-                    linestyle=style,
-                    solid_capstyle="butt",
-                )
-        _draw_ticks(ax, solution, chosen)
-        _draw_strip(ax, parts, colours, chosen)
-    marked = _draw_events(ax, solution, shown, chosen)
-    names = list(shown.names)
-    handles = mode_handles(colours) if solution.surfaces else []
-    handles += _state_handles(names, chosen, None if solution.surfaces else palette(dark))
-    draw_legend(ax, handles + marked, chosen)
-    ax.set_xlabel("t")
-    if len(names) == 1:
-        ax.set_ylabel(names[0])
-    ax.margins(x=0)
+    _draw(solution, shown, ax, look)
+    ax.set_xlabel(label_of("t", units))
     return ax
 
 
-def _line_style(order: int, width: float) -> Any:
-    """Return the style of the state drawn as number `order`, with dashes as long on a heavy line."""
-    style = _LINE_STYLES[order % len(_LINE_STYLES)]
+class _Look(NamedTuple):
+    """How a solution is drawn: the arguments of `time_series` after the states."""
+
+    dark: bool | None
+    legend: bool | str
+    label: str | None
+    strip: bool
+    units: Mapping[str, str] | None
+
+
+def _draw_rows(solution: Solution, shown: Curves, look: _Look) -> Any:
+    count = len(shown.names)
+    size = (7.0, 0.6 + max(1.1 * count, 2.4))
+    _, grid = import_pyplot().subplots(
+        count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained"
+    )
+    panels = grid[:, 0]
+    for row, panel in enumerate(panels):
+        new_axes(panel, size, look.dark)
+        one = Curves(shown.places[row : row + 1], shown.names[row : row + 1])
+        is_last = row == count - 1
+        legend = look.legend if row == 0 else False
+        _draw(solution, one, panel, look._replace(legend=legend, strip=look.strip and is_last))
+        panel.tick_params(labelbottom=is_last)
+    panels[-1].set_xlabel(label_of("t", look.units))
+    return panels
+
+
+def _draw(solution: Solution, shown: Curves, ax: Any, look: _Look) -> None:
+    from filippov.plot.lines import View, add_line
+
+    names, chosen = shown.names, theme(look.dark)
+    if len(names) > len(_LINE_STYLES) * len(_STATE_MARKERS):
+        raise ValueError(f'states: {len(names)} cannot be distinguished in one axes; use layout="rows"')
+    track = Track(solution, shown, [(0, row + 1) for row in range(len(names))])
+    by_mode = bool(solution.surfaces) and look.label is None
+    colours = mode_colours(track.modes, look.dark)
+    own = None if look.label is None else own_colour(ax, look.label, chosen)
+    # Where modes have no colours the states have.
+    of_states = [own or (None if by_mode else numbered_colour(row, chosen)) for row in range(len(names))]
+    view = View(track, ax)
+    for row, of_state in enumerate(of_states):
+        for mode, pieces in track.groups(by_mode):
+            width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
+            add_line(
+                view,
+                row,
+                pieces,
+                color=of_state or colours[mode],
+                linewidth=width,
+                linestyle=_line_style(row, width),
+                solid_capstyle="butt",
+                zorder=2.2 if mode.is_sliding else 2.0,
+            )
+        _draw_markers(ax, track, row, of_state or chosen.ink, chosen)
+    handles = entries_of(ax) if look.label is not None else []
+    handles += mode_handles(colours, look.dark) if by_mode else []
+    handles += _state_handles(names, [colour if own is None else None for colour in of_states], chosen)
+    if look.label is not None:
+        handles.append(handle(look.label, color=own, linewidth=SMOOTH_WIDTH))
+    handles += _draw_events(ax, solution, shown, chosen)
+    handles += draw_failure(ax, track, chosen)
+    if look.strip and by_mode:
+        _draw_ticks(ax, solution, chosen)
+        _draw_strip(ax, track, colours, chosen)
+    draw_legend(ax, handles, chosen, look.legend, mode_title(solution.surfaces) if by_mode else None)
+    if len(names) == 1:
+        ax.set_ylabel(label_of(names[0], look.units))
+    ax.margins(x=0, y=_FREE)
+
+
+def _line_style(row: int, width: float) -> Any:
+    """Return the style of the state drawn as number `row`, with dashes as long on a heavy line."""
+    style = _LINE_STYLES[row % len(_LINE_STYLES)]
     if isinstance(style, str):
         return style
     offset, dashes = style  # Matplotlib measures them in units of the line width
     return offset, tuple(length * SMOOTH_WIDTH / width for length in dashes)
 
 
-def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], dark: bool | None) -> None:
-    colours = palette(dark)
-    times = np.concatenate([part[1] for part in parts])
-    for order, values in enumerate(np.concatenate([part[2] for part in parts], axis=1)):
-        style = _LINE_STYLES[order % len(_LINE_STYLES)]
-        ax.plot(times, values, color=colours[order % len(colours)], linewidth=SMOOTH_WIDTH, linestyle=style)
+def _marker_style(row: int, colour: Any, chosen: Theme) -> dict[str, Any]:
+    marker = _STATE_MARKERS[row // len(_LINE_STYLES)]
+    return {"marker": marker, "markersize": 4, "markerfacecolor": chosen.ground, "markeredgecolor": colour}
+
+
+def _draw_markers(ax: Any, track: Track, row: int, colour: str, chosen: Theme) -> None:
+    """Mark a curve at some times, from the fifth state of an axes on: there are four line styles."""
+    line = track.base
+    if row < len(_LINE_STYLES) or len(line.t) < 2:
+        return
+    shares = (np.arange(_MARKERS_OF_A_CURVE) + 0.5 + 0.04 * row) / (_MARKERS_OF_A_CURVE + 1)
+    places = np.searchsorted(np.abs(line.t - line.t[0]), shares * abs(line.t[-1] - line.t[0]))
+    style = _marker_style(row, colour, chosen)
+    ax.plot(line.t[places], line.values[row, places], linestyle="none", zorder=2.5, **style)
 
 
 def _draw_ticks(ax: Any, solution: Solution, chosen: Theme) -> None:
@@ -132,54 +229,60 @@ def _draw_ticks(ax: Any, solution: Solution, chosen: Theme) -> None:
         )
 
 
-def _draw_strip(ax: Any, parts: list[tuple[Mode, Any, Any]], colours: dict[Mode, str], chosen: Theme) -> None:
-    """Draw a thin strip of modes along the lower edge, sliding higher than the rest, with room above it."""
-    low, high = ax.get_ylim()
-    ax.set_ylim(low - _FREE * (high - low), high)
-    length = abs(parts[-1][1][-1] - parts[0][1][0]) if len(parts[-1][1]) and len(parts[0][1]) else 0.0
-    for mode, times, _ in parts:
-        if len(times) < 2 or length == 0.0:
-            continue
-        ax.axvspan(
-            times[0],
-            times[-1],
-            0.0,
-            _STRIP_SLIDING if mode.is_sliding else _STRIP,
-            color=colours[mode],
-            linewidth=0,
-            zorder=0,
+def _draw_strip(ax: Any, track: Track, colours: dict[Mode, str], chosen: Theme) -> None:
+    """Draw a thin strip of modes along the lower edge, sliding higher than the rest.
+
+    Its heights are shares of the axes: it stays where it is on every scale and at every zoom.
+    """
+    from matplotlib.collections import PolyCollection
+
+    starts, durations = track.spans[:, 0], np.diff(track.spans, axis=1)[:, 0]
+    transform = ax.get_xaxis_transform()
+    for mode, pieces in track.groups(True):
+        height = _STRIP_SLIDING if mode.is_sliding else _STRIP
+        left, right = starts[pieces], starts[pieces] + durations[pieces]
+        corners = np.array(
+            [[left, left, right, right], [0 * left, 0 * left + height, 0 * left + height, 0 * left]]
         )
-        if abs(times[-1] - times[0]) > _WIDTH_OF_A_LETTER * (1 + len(mode)) * length:
+        strip = PolyCollection(
+            list(corners.transpose(2, 1, 0)),
+            facecolor=colours[mode],
+            linewidth=0,
+            zorder=0.5,
+            label=str(mode),
+        )
+        strip.set(transform=transform, snap=False)  # pieces narrower than a pixel keep their share of it
+        ax.add_collection(strip, autolim=False)
+    whole = np.abs(durations).sum()
+    for mode, start, duration in zip(track.modes, starts, durations, strict=True):
+        if whole > 0.0 and abs(duration) > _WIDTH_OF_A_LETTER * (1 + len(mode)) * whole:
             ax.text(
-                0.5 * (times[0] + times[-1]),
-                _STRIP_SLIDING + 0.01,
+                start + 0.5 * duration,
+                _STRIP_SLIDING + 0.005,
                 str(mode),
-                transform=ax.get_xaxis_transform(),
+                transform=transform,
                 ha="center",
                 va="bottom",
                 fontsize="x-small",
                 color=chosen.ink,
+                clip_on=True,
             )
 
 
 def _draw_events(ax: Any, solution: Solution, shown: Curves, chosen: Theme) -> list[Any]:
     """Mark the events of the user on the curves; return the entries of the legend."""
     handles: list[Any] = []
-    if solution.t_events is None or solution.y_events is None:
-        return handles
-    for number, (times, states) in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
-        if not len(times):
-            continue
+    for name, marker, times, states in events_of(solution):
         for order, row in enumerate(shown.beside(solution, times, states)):
             (line,) = ax.plot(
                 times,
                 row,
-                _EVENT_MARKERS[number % len(_EVENT_MARKERS)],
+                marker,
                 markersize=5,
                 markerfacecolor="none",
                 markeredgecolor=chosen.ink,
                 linestyle="none",
-                label=f"event {number}",
+                label=name,
                 zorder=3,
             )
             if order == 0:
@@ -187,15 +290,17 @@ def _draw_events(ax: Any, solution: Solution, shown: Curves, chosen: Theme) -> l
     return handles
 
 
-def _state_handles(names: list[str], chosen: Theme, colours: list[str] | None) -> list[Any]:
-    """Return the entries of the legend that tell the states apart, where there are several."""
-    from matplotlib.lines import Line2D
-
+def _state_handles(names: Sequence[str], colours: Sequence[Any], chosen: Theme) -> list[Any]:
+    """Return the entries of the legend that distinguish the states, where there are several."""
     if len(names) < 2:
         return []
-    handles = []
-    for order, name in enumerate(names):
-        colour = chosen.ink if colours is None else colours[order % len(colours)]
-        style = _LINE_STYLES[order % len(_LINE_STYLES)]
-        handles.append(Line2D([], [], color=colour, linewidth=SMOOTH_WIDTH, linestyle=style, label=name))
-    return handles
+    return [
+        handle(
+            name,
+            color=colour or chosen.ink,
+            linewidth=SMOOTH_WIDTH,
+            linestyle=_line_style(row, SMOOTH_WIDTH),
+            **_marker_style(row, colour or chosen.ink, chosen),
+        )
+        for row, (name, colour) in enumerate(zip(names, colours, strict=True))
+    ]

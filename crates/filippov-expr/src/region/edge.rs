@@ -2,7 +2,6 @@
 //!
 //! The expression of one region is evaluated beyond its border too. `sqrt(abs(x))` is the root of x or of -x, and ends at x = 0.
 
-use crate::graph::Graph;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -10,6 +9,9 @@ use crate::region::{Possible, Regions};
 
 /// That many combinations of signs are looked at.
 const MOST_COMBINATIONS: usize = 64;
+
+/// An argument that is nowhere in a region nearer than this to an end of the domain does not reach it behind the border.
+const CLEAR_OF_END: f64 = 1e-6;
 
 /// A function in an expression that ends or is singular at the border of a region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,35 +82,44 @@ impl Regions {
     /// Whether a function with a bounded domain has an argument with signs that may leave it.
     fn may_end(&mut self, id: NodeId) -> bool {
         use UnaryOp::*;
-        let (a, is_half_line) = match *self.graph.node(id) {
-            Node::Unary(Sqrt | Log | Log2 | Log10, a) => (a, true),
-            Node::Unary(Log1p | Asin | Acos | Acosh | Atanh, a) => (a, false),
+        // The ends of the domain, and on which side of them it is.
+        let (a, ends): (_, &[(f64, f64)]) = match *self.graph.node(id) {
+            Node::Unary(Sqrt | Log | Log2 | Log10, a) => (a, &[(0.0, 1.0)]),
+            Node::Unary(Log1p, a) => (a, &[(-1.0, 1.0)]),
+            Node::Unary(Acosh, a) => (a, &[(1.0, 1.0)]),
+            Node::Unary(Asin | Acos | Atanh, a) => (a, &[(-1.0, 1.0), (1.0, -1.0)]),
             Node::Binary(BinaryOp::Pow, a, b) => match self.graph.as_constant(b) {
                 Some(b) if b.fract() == 0.0 => return false,
-                _ => (a, true),
+                _ => (a, &[(0.0, 1.0)]),
             },
             _ => return false,
         };
         if !self.graph.facts(a).has_sign {
             return false;
         }
-        let stays = |graph: &Graph, value: NodeId| {
-            !graph.depends_on_motion(value) || is_half_line && graph.facts(value).nonnegative
+        let Some(values) = self.expressions(a) else {
+            return true;
         };
-        match self.expressions(a) {
-            Some(values) => !values.into_iter().all(|value| stays(&self.graph, value)),
-            None => true,
-        }
+        values.into_iter().any(|(value, signs)| {
+            let is_safe = !self.graph.depends_on_motion(value)
+                || ends == [(0.0, 1.0)] && self.graph.facts(value).nonnegative;
+            let mut reaches = |&(end, side): &(f64, f64)| {
+                let border = self.graph.constant(end + side * CLEAR_OF_END);
+                let inside = self.graph.sub(value, border);
+                self.possible(&signs, Some((inside, -side))) == Possible::Yes
+            };
+            !is_safe && ends.iter().any(&mut reaches)
+        })
     }
 
-    /// What an expression is in its regions; none if there are too many.
-    fn expressions(&mut self, node: NodeId) -> Option<Vec<NodeId>> {
+    /// What an expression is in its regions, with their signs; none if there are too many.
+    fn expressions(&mut self, node: NodeId) -> Option<Vec<(NodeId, Vec<Option<f64>>)>> {
         let mut found = Vec::new();
         let mut pending = vec![(node, vec![None; self.graph.n_surfaces()])];
         while let Some((value, signs)) = pending.pop() {
             let depends = self.graph.sign_dependencies(&[value], &[]);
             let Some(k) = depends.iter().position(|&depends| depends) else {
-                found.push(value);
+                found.push((value, signs));
                 continue;
             };
             if found.len() + pending.len() > MOST_COMBINATIONS {

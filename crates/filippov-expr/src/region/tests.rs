@@ -223,7 +223,11 @@ fn edges() {
     let inside = g.mul(stiff, square);
     let inside = g.add(inside, one);
     let inside = g.unary(UnaryOp::Sqrt, inside);
+    let far = g.add(size, one);
+    let (log, log1p) = (g.unary(UnaryOp::Log, far), g.unary(UnaryOp::Log1p, size));
     let mut regions = Regions::new(g, vec![], vec![]);
+    assert_eq!(regions.edge(log), None);
+    assert_eq!(regions.edge(log1p), None);
     assert_eq!(regions.edge(root), Some(Edge::Domain(root)));
     assert_eq!(regions.edge(root_of_ramp), Some(Edge::Domain(root_of_ramp)));
     assert_eq!(regions.edge(bent), Some(Edge::Singular(cube_root)));

@@ -8,6 +8,7 @@ use super::point::{Left, Lefts, Notes, Point, Values};
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
+use crate::powers::power;
 use crate::system::{dot, MotionJets};
 use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
 
@@ -62,7 +63,7 @@ impl MotionSeries {
         let speed = (0..n).map(|i| of(i, 1)).fold(0.0, f64::max);
         let rate = |i: usize| {
             let orders = 1..=jets.order();
-            let rates = orders.map(|k| of(i, k).powf(1.0 / k as f64));
+            let rates = orders.map(|k| power(of(i, k), 1.0 / k as f64));
             rates.filter(|rate| rate.is_finite()).fold(speed, f64::max)
         };
         let rates = (0..n).map(rate).collect();

@@ -5,12 +5,14 @@
 mod classify;
 mod hidden_dynamics;
 mod leg;
+mod message;
 mod mode_field;
 mod not_finite;
 
 pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
 pub use leg::{leg, Leg, LegError, Over};
+pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
 

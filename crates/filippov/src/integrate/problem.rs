@@ -161,6 +161,15 @@ pub(super) fn check(problem: &Problem) -> Result<(), Error> {
         options.max_step > 0.0,
         "must be positive",
     )?;
+    if let Some(limit) = options.max_wall_time {
+        let runs = options.clock.runs();
+        require(
+            "max_wall_time",
+            limit,
+            runs,
+            "needs a clock, which this platform does not have; use max_steps",
+        )?;
+    }
     if let Some(factor) = options.stabilization.restoring() {
         require(
             "stabilization",

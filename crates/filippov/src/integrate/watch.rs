@@ -1,7 +1,7 @@
 //! When a run has to end before its time: the limit of wall time, and the caller's wish.
 
 use std::cell::{Cell, RefCell};
-use std::time::Instant;
+use std::time::Duration;
 
 use crate::options::Options;
 use crate::status::Stop;
@@ -24,11 +24,11 @@ enum Over {
 /// Looks at the clock and at the caller's wish.
 pub(super) struct Watch<'a> {
     options: &'a Options,
-    started: Cell<Option<Instant>>,
+    started: Cell<Option<Duration>>,
     interrupt: RefCell<Option<Interrupt<'a>>>,
     over: Cell<Option<Over>>,
     /// When it looked last, after how many steps it looks again, and at which attempt.
-    looked: Option<Instant>,
+    looked: Option<Duration>,
     interval: u64,
     next: u64,
 }
@@ -52,7 +52,7 @@ impl<'a> Watch<'a> {
     }
 
     /// The time by the clock of the run.
-    pub fn now(&self) -> Instant {
+    pub fn now(&self) -> Duration {
         self.options.clock.now()
     }
 
@@ -79,7 +79,7 @@ impl<'a> Watch<'a> {
     #[cold]
     fn look_now(&mut self, attempts: u64, t: f64) {
         let now = self.now();
-        let is_slow = |looked: Instant| (now - looked).as_secs_f64() > SLOW_POLL;
+        let is_slow = |looked: Duration| (now - looked).as_secs_f64() > SLOW_POLL;
         self.interval = match self.looked.is_some_and(is_slow) {
             true => 1,
             false => (2 * self.interval).min(LONGEST_POLL),
@@ -89,7 +89,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Has a limit been reached, now or before? `t` is the time that the run has reached.
-    pub fn is_over(&self, now: Instant, t: f64) -> bool {
+    pub fn is_over(&self, now: Duration, t: f64) -> bool {
         if self.over.get().is_none() {
             let elapsed = self.started.get().map(|started| now - started);
             let most = self.options.max_wall_time;

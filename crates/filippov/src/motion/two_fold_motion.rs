@@ -16,6 +16,7 @@ use smallvec::{smallvec, SmallVec};
 
 use super::leading::Leading;
 use crate::error::FieldError;
+use crate::powers::power;
 use crate::system::{LieValue, PiecewiseSystem, Place};
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 
@@ -65,7 +66,7 @@ impl TwoFoldMotion {
     /// How long the series of the multiplier has no larger error than this.
     pub fn reach(&self, tolerance: f64) -> f64 {
         let last = self.n_known.saturating_sub(2).max(1)..self.n_known.max(1);
-        let reach = |k: usize| (tolerance / self.series[k].abs()).powf(1.0 / k as f64);
+        let reach = |k: usize| power(tolerance / self.series[k].abs(), 1.0 / k as f64);
         match self.n_known {
             ..=1 => 0.0,
             _ => last.map(reach).fold(f64::INFINITY, f64::min),

@@ -12,7 +12,7 @@ use crate::record::{DecisionRecord, Held, Piece};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
-use crate::switch::Switch;
+use crate::switch::{Kind, Switch};
 use crate::system::{Actions, PiecewiseSystem, Setting};
 
 /// A piece of constant mode.
@@ -163,6 +163,26 @@ impl Solution {
 }
 
 impl Solution {
+    /// The switches that a user sees, if these are the first `n` surfaces: not the crossings and touches of the others.
+    pub fn switches_of_first(&self, n: usize) -> impl Iterator<Item = &Switch> {
+        self.switches.iter().filter(move |s| {
+            !matches!(s.kind, Kind::Crossing | Kind::Grazing)
+                || s.surfaces.iter().any(|&j| j < n)
+                || s.mode_before.first(n) != s.mode_after.first(n)
+        })
+    }
+
+    /// The times at which a segment begins, one of its steps ends and the next one begins, and at which it ends. Two equal times for
+    /// a segment without duration; nothing in between if no steps are kept.
+    pub fn knots_of(&self, segment: &Segment) -> impl Iterator<Item = f64> + '_ {
+        let (from, to) = segment.steps;
+        let steps = self.steps.get(from..to).unwrap_or_default();
+        let inner = steps.iter().skip(1).map(|step| step.t0);
+        let (start, end) = (segment.t_start, segment.t_end);
+        let inner = inner.filter(move |&t| start < t && t < end);
+        std::iter::once(start).chain(inner).chain([end])
+    }
+
     /// Writes the derivative in time of the continuous extension; `None` outside of the span or without dense output.
     pub fn rate(&self, t: f64, side: Side, dy: &mut [f64]) -> Option<()> {
         let (first, last) = (self.segments.first()?, self.segments.last()?);

@@ -1,5 +1,7 @@
 //! Step size control.
 
+use crate::powers::power;
+
 /// The PI controller of DOPRI5 (Hairer, Norsett, Wanner, section IV.2): after an accepted step
 ///
 ///   dt <- dt * 0.9 err^-alpha err_old^beta,  beta = 0.04, alpha = 1/5 - 0.75 beta,
@@ -36,7 +38,7 @@ impl Controller {
     /// The factor for another attempt after one with this error was rejected.
     pub fn reject(&mut self, error: f64) -> f64 {
         self.rejected = true;
-        (SAFETY * error.powf(-0.2)).clamp(SHRINK, SAFETY)
+        (SAFETY * power(error, -0.2)).clamp(SHRINK, SAFETY)
     }
 
     /// The step was not finite: no growth after the next one.

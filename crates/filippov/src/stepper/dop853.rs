@@ -6,6 +6,7 @@ use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::error_scale::root_mean_square;
 use crate::motion::{observer, Run, SmoothField};
+use crate::powers::power;
 
 /// The stages at which an observer is called.
 const OBSERVED: [usize; 5] = [3, 5, 8, 9, 10];
@@ -90,7 +91,7 @@ impl Dop853 {
             }
             self.extend(y, dt);
         }
-        Ok(Attempt::Error(error.powf(AS_OF_ORDER_FIVE)))
+        Ok(Attempt::Error(power(error, AS_OF_ORDER_FIVE)))
     }
 
     /// |e5|^2 / (|e5|^2 + |e3|^2/100)^(1/2), the norms in units of the tolerance: e5 where the two agree about the order.
@@ -106,7 +107,7 @@ impl Dop853 {
         if fifth == 0.0 {
             return if third.is_finite() { 0.0 } else { third };
         }
-        fifth * (fifth / fifth.hypot(0.1 * third))
+        fifth * (fifth / libm::hypot(fifth, 0.1 * third))
     }
 
     /// y0 + x (F0 + u (F1 + x (F2 + u (F3 + x (F4 + u (F5 + x F6)))))) with u = 1 - x, in powers of x = theta.

@@ -3,6 +3,7 @@
 use super::ErrorScale;
 use crate::error::FieldError;
 use crate::motion::SmoothField;
+use crate::powers::power;
 use crate::tolerances::SMALLEST_GUESS;
 
 /// Hairer's guess of the first step of a method of order 5, from two derivatives.
@@ -39,7 +40,7 @@ pub fn initial_step(
     let step = if fastest <= 1e-15 {
         (guess * 1e-3).max(1e-6)
     } else {
-        (0.01 / fastest).powf(0.2)
+        power(0.01 / fastest, 0.2)
     };
     let step = step.min(100.0 * guess).max(SMALLEST_GUESS);
     Ok(step.min(longest))
@@ -76,7 +77,7 @@ pub fn restart_step(
     if !fastest.is_finite() || fastest <= 1e-15 {
         return Ok(proposal);
     }
-    Ok(proposal.min((0.1 / fastest).powf(0.2)))
+    Ok(proposal.min(power(0.1 / fastest, 0.2)))
 }
 
 /// As the guess of [`initial_step`] without its evaluation, and aiming at a thousandth of the tolerance
@@ -87,6 +88,6 @@ pub fn tiny_step(y: &[f64], dy: &[f64], scale: &ErrorScale) -> f64 {
     if speed < 1e-5 {
         0.0
     } else {
-        (0.001 / speed).powf(0.2)
+        power(0.001 / speed, 0.2)
     }
 }

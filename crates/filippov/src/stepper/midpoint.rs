@@ -4,6 +4,7 @@ use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::locate::{refine, Bracket};
 use crate::motion::{observer, Guard, ModeField, Run, SmoothField};
+use crate::powers::power;
 use crate::tolerances::EPS;
 
 /// The error e counts as e^(5/2) in the control of the step size, which is made for methods of order 5: 1 stays 1, and
@@ -81,7 +82,7 @@ impl Midpoint {
         let error = scale.norm(&rows[2 * n..], &self.step.end);
         let is_finite = error.is_finite() && self.step.end_derivative.iter().all(|v| v.is_finite());
         Ok(if is_finite {
-            Attempt::Error(error.powf(AS_OF_ORDER_FIVE))
+            Attempt::Error(power(error, AS_OF_ORDER_FIVE))
         } else {
             Attempt::NotFinite
         })

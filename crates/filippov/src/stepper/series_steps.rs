@@ -9,6 +9,7 @@ use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::motion::{observer, CurrentMotion, ModeField, Run, Seen, SmoothField};
 use crate::options::{Method, Options};
+use crate::powers::power;
 use crate::status::{Warning, WarningCode};
 use crate::system::{MotionJets, PiecewiseSystem};
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, STIFF_SERIES, TAYLOR_SHORTEST};
@@ -80,7 +81,7 @@ impl Taylor {
         let tolerance = atol.fold(f64::INFINITY, f64::min) + options.rtol * value;
         let reach = |k: usize| {
             let rounding = EPS * self.coefficient(place, k).abs();
-            (tolerance / rounding).powf(1.0 / k as f64)
+            power(tolerance / rounding, 1.0 / k as f64)
         };
         (2..self.order() - 1)
             .filter(|&k| self.coefficient(place, k) != 0.0)

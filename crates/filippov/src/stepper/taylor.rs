@@ -8,6 +8,7 @@ use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::motion::SmoothField;
+use crate::powers::power;
 use crate::system::MotionJets;
 use crate::tolerances::{
     ERRORS_OF_STEPS, TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP,
@@ -59,7 +60,7 @@ impl Taylor {
     /// The order for a relative tolerance. The higher the order, the longer and dearer the step; `operations` tells
     /// how many the coefficients up to an order take, if there are any.
     pub fn order_for(rtol: f64, operations: impl Fn(usize) -> Option<usize>) -> usize {
-        let digits = -rtol.log10().min(0.0);
+        let digits = -libm::log10(rtol).min(0.0);
         let order = |(per_digit, beside): (f64, f64)| {
             let order = (per_digit * digits + beside).ceil() as usize;
             order.clamp(2, TAYLOR_LARGEST_ORDER)
@@ -325,7 +326,7 @@ impl Taylor {
     /// The factor for another attempt after one with this error was rejected.
     pub fn reject(&self, error: f64) -> f64 {
         let exponent = -1.0 / (self.order + 1) as f64;
-        (0.9 * error.powf(exponent)).clamp(0.1, 0.9)
+        (0.9 * power(error, exponent)).clamp(0.1, 0.9)
     }
 
     /// The error of the series at theta > 1 in units of the tolerance.

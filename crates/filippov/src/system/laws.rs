@@ -24,7 +24,7 @@ use super::{PiecewiseSystem, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::switch::Kind;
 use crate::system::{ActionMap, Clock, Trigger};
-use crate::tolerances::SAME_NUMBER;
+use crate::tolerances::{SAME_NUMBER, SAME_TICK};
 
 /// What a discrete state follows; the expressions may contain discrete states of laws before it.
 #[derive(Clone, Debug, PartialEq)]
@@ -478,16 +478,21 @@ pub(crate) fn n_named(laws: &[Law]) -> usize {
     laws.iter().filter(is_named).count()
 }
 
+/// How far a number may be off by rounding.
+fn rounding_of(value: f64) -> f64 {
+    SAME_NUMBER + SAME_TICK * value.abs()
+}
+
 /// How many knots are not above g, which moves in the direction of `rate`; one within rounding of g has been passed.
 fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
-    let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    let beside = rounding_of(g) * if rate < 0.0 { -1.0 } else { 1.0 };
     knots.partition_point(|&knot| knot <= g + beside) as f64
 }
 
 /// The same, looked for at the knot behind `before` first.
 fn passed_from(knots: &[f64], before: f64, g: f64, rate: f64) -> f64 {
     let next = before + if rate < 0.0 { -1.0 } else { 1.0 };
-    let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    let beside = rounding_of(g) * if rate < 0.0 { -1.0 } else { 1.0 };
     let is_passed = |place: usize| knots.get(place).is_some_and(|&knot| knot <= g + beside);
     let is_next =
         next >= 0.0 && !is_passed(next as usize) && (next == 0.0 || is_passed(next as usize - 1));
@@ -543,7 +548,7 @@ fn sign(value: f64) -> f64 {
 /// The floor; a value within rounding of a whole number is that number.
 fn floor(value: f64) -> f64 {
     let nearest = value.round();
-    if (value - nearest).abs() <= SAME_NUMBER * (1.0 + value.abs()) {
+    if (value - nearest).abs() <= rounding_of(value) {
         nearest
     } else {
         value.floor()

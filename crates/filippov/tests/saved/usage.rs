@@ -26,8 +26,9 @@ pub fn use_everything(system: SavedSystem, case: u64) -> bool {
     };
     for (t, scale) in [(0.0, 0.0), (0.3, 0.7)] {
         let x: Vec<f64> = (0..n).map(|i| scale * (1.0 - 0.6 * i as f64)).collect();
-        let (system, q) = runnable.at(&parameters, t, &x).unwrap();
-        evaluate(&system, (t, &x), &q);
+        let ready = runnable.at(&parameters, t, &x).unwrap();
+        let (system, q) = (ready.system(), ready.discrete());
+        evaluate(system, (t, &x), q);
     }
     let methods = [
         Method::Auto,

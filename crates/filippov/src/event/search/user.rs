@@ -232,7 +232,8 @@ impl StepSearch<'_, '_> {
         };
         let noise = (ROUNDING * size).max(along.rounding(self, from));
         let is_zero = before.is_known_zero || value.abs() <= noise;
-        let sign = match is_zero {
+        // A root that begins here may not exist a rounding error before.
+        let sign = match is_zero || value.is_nan() {
             true if to == from => 0.0,
             true => sign_of(along.value(self, from + 1e-7 * (to - from))?),
             false => sign_of(value),

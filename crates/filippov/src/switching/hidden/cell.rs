@@ -2,6 +2,7 @@
 
 use super::first_zero::{first_loss, largest_change, value};
 use crate::cube::{NormalFields, SignGroup, Vector};
+use crate::powers::power;
 use crate::tolerances::SAME_NUMBER;
 
 /// Order of the series. By Jorba and Zou (2005) the best order is about -ln(error)/2 + 1 = 15, if each order costs as much
@@ -158,7 +159,7 @@ impl Cell {
             let at_order = self.state.iter().map(|series| series[k].abs());
             at_order.fold(f64::MIN_POSITIVE, f64::max)
         };
-        let length = |k: usize| (SAME_NUMBER / largest(k)).powf(1.0 / k as f64);
+        let length = |k: usize| power(SAME_NUMBER / largest(k), 1.0 / k as f64);
         length(ORDER).min(length(ORDER - 1))
     }
 }

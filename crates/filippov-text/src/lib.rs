@@ -1,0 +1,35 @@
+//! Right-hand sides typed as Python text: the same expressions as tracing the function gives, without Python.
+//!
+//! The text has one function `def fun(t, x, a=0.1, ...)`; imports of NumPy and `math` and numbers with a name may stand before it.
+//! Arguments with a default are parameters. The states have the names of the first unpacking, `y, v = x`. Read are assignments,
+//! arithmetic, functions of NumPy and `math`, comparisons, `and`, `or`, `not`, `np.where` and `if` with any branches. Everything
+//! else is refused by name, with its line and column: a model is never read as something that Python would not compute. So are
+//! models whose trace needs more than expressions, such as floors, comparisons within comparisons, and those of parameters alone.
+//!
+//! As in tracing, the function is followed once for every combination of answers to its comparisons.
+//!
+//! ```
+//! let text = "def oscillator(t, x, F=0.4):\n    y, v = x\n    return v, -y - F * np.sign(v)\n";
+//! let model = filippov_text::read(text)?;
+//! assert_eq!(model.system.definition.names.states, ["y", "v"]);
+//! assert_eq!(model.system.defaults, [0.4]);
+//!
+//! let refused = filippov_text::read("def f(t, x):\n    return open(x)\n").unwrap_err();
+//! assert_eq!((refused.line, refused.column), (2, 12));
+//! # Ok::<(), filippov_text::Unreadable>(())
+//! ```
+
+#[cfg(target_arch = "wasm32")]
+mod abi;
+mod calls;
+mod expressions;
+mod module;
+mod reply;
+mod statements;
+mod tracer;
+mod unreadable;
+mod values;
+
+pub use module::{read, TextModel};
+pub use reply::reply;
+pub use unreadable::Unreadable;
