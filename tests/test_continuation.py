@@ -88,11 +88,30 @@ def test_curves_in_two_parameters_start_at_special_points(dry: fl.Branch) -> Non
         for point in POINTS[name]["points"]:
             found = curve.at(F=float(point["F"])).params["omega"]
             assert abs(found - float(point["omega"])) < 1e-10
+            check_switches(curve.at(F=float(point["F"])), point)
         if code == "CS":
             (end,) = curve.special["CP"]
             assert abs(end.params["F"] - 1 / 3) < 1e-7
             assert abs(end.params["omega"] - 1 / 2) < 1e-7
             assert "degenerate" in curve.reason
+            y = POINTS[name]["end_of_the_curve"]["y_at_crossing"]
+            assert min(abs(abs(start[0]) - abs(value(y))) for start in end.state.itinerary.starts) < 1e-3
+
+
+def check_switches(cycle: fl.Cycle, point: dict[str, str]) -> None:
+    """Compare where and when the mass turns; modulo half a period with the other sign."""
+    half = 0.5 * cycle.period
+    legs, starts = cycle.itinerary.legs, cycle.itinerary.starts
+    turns = [
+        ((leg.ending.time - 1e-12) % half, abs(starts[(i + 1) % len(legs)][0]))
+        for i, leg in enumerate(legs)
+        if leg.ending is not None and leg.mode[0] != 0
+    ]
+    if "time_of_crossing" in point:
+        time, y = float(point["time_of_crossing"]) % half, abs(float(point["y_at_crossing"]))
+    else:
+        time, y = float(point["slip_ends_at"]) % half, abs(float(point["y_stick"].lstrip("+-")))
+    assert min(max(abs(t - time), abs(x - y)) for t, x in turns) < 1e-8
 
 
 def test_resonance_is_the_reason_that_a_branch_ends() -> None:
@@ -139,7 +158,10 @@ def test_sliding_bifurcations_of_a_planar_cycle() -> None:
     for point in POINTS["harvest_cycle"]["points"]:
         code = {"switching-sliding": "SS", "crossing-sliding": "CS", "grazing-sliding": "GS"}[point["type"]]
         found = [special.params["alpha"] for special in branch.special[code]]
-        assert np.min(np.abs(np.array(found) - float(point["alpha"]))) < 1e-8
+        nearest = int(np.argmin(np.abs(np.array(found) - float(point["alpha"]))))
+        assert abs(found[nearest] - float(point["alpha"])) < 1e-8
+        if "period" in point:
+            assert abs(branch.special[code][nearest].state.period - float(point["period"])) < 1e-8
     assert bool(branch.data.admissible.all())
 
 
@@ -159,6 +181,32 @@ def test_grazing_of_an_impact(row: int) -> None:
     assert abs(grazing.params["omega"] - omega) < 1e-8
 
 
+@pytest.mark.parametrize(("row", "start", "low"), [(1, 1.6, 1.4), (2, 2.4, 2.1)])
+def test_fold_of_cycles_with_more_damping_or_a_wall_that_presses(row: int, start: float, low: float) -> None:
+    point = POINTS["impact_fold"]["points"][row]
+    exact, omega = float(point["omega"]), start
+    system = impacts("impact_fold", zeta=point["zeta"], omega=str(omega), s=point["s"])
+    cycle = fl.limit_cycle(system, [float(point["s"]) + 0.01, 2.4], t0=1.7)
+    branch = fl.continuation(cycle, "omega", (low, 2.6))
+    found = np.array([special.params["omega"] for special in branch.special["LP"]])
+    fold = branch.special["LP"][int(np.argmin(np.abs(found - exact)))]
+    assert abs(fold.params["omega"] - exact) < 1e-8
+    np.testing.assert_allclose(
+        np.min(np.abs(fold.state.multipliers)), float(point["multiplier_other"]), atol=1e-6
+    )
+    check_impact(fold, point)
+
+
+def check_impact(special: Any, point: Any) -> None:
+    """Compare speed and phase of the impact of a cycle."""
+    cycle, omega = special.state, special.params["omega"]
+    speeds = [start[1] for start in cycle.itinerary.starts if abs(start[0] - cycle.params["s"]) < 1e-9]
+    assert np.min(np.abs(np.array(speeds) - float(point["v_after"]))) < 1e-6
+    times = [leg.ending.time for leg in cycle.itinerary.legs if leg.ending is not None]
+    phases = [np.remainder(omega * t - float(point["theta"]) + np.pi, 2 * np.pi) - np.pi for t in times]
+    assert np.min(np.abs(phases)) < 1e-5
+
+
 def test_folds_of_cycles_with_an_impact() -> None:
     point = POINTS["impact_fold"]["points"][0]
     system = impacts("impact_fold", omega="1.6", s=point["s"])
@@ -166,6 +214,7 @@ def test_folds_of_cycles_with_an_impact() -> None:
     branch = fl.continuation(cycle, "omega", (1.2, 2.2))
     (fold,) = branch.special["LP"]
     assert abs(fold.params["omega"] - float(point["omega"])) < 1e-8
+    check_impact(fold, point)
     other = np.sort(np.abs(fold.state.multipliers))
     np.testing.assert_allclose(other, [float(point["multiplier_other"]), 1.0], atol=1e-5)
     # The unstable half comes to the cycle that only touches the wall, and the branch goes on without impacts.
@@ -182,6 +231,10 @@ def test_period_doublings_of_cycles_with_an_impact() -> None:
     exact = [float(point["omega"]) for point in POINTS["impact_flip"]["points"]]
     found = [point.params["omega"] for point in branch.special["PD"]]
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8)
+    for special, point in zip(branch.special["PD"], POINTS["impact_flip"]["points"], strict=True):
+        check_impact(special, point)
+        values = np.sort(special.state.multipliers.real)
+        np.testing.assert_allclose(values, [-1.0, float(point["multiplier_other"])], rtol=0, atol=1e-8)
 
 
 def test_grazing_sliding_of_the_drill_string() -> None:
@@ -191,6 +244,8 @@ def test_grazing_sliding_of_the_drill_string() -> None:
     grazing = branch.special["GS"][0]
     assert abs(grazing.params["u"] - float(exact["u"])) < 1e-8
     assert abs(grazing.state.period - float(exact["period"])) < 1e-8
+    states = grazing.state.solution.sol(np.array([grazing.t - grazing.state.t0]) % grazing.state.period)
+    np.testing.assert_allclose(states[:, 0], [value(text) for text in exact["y"]], rtol=0, atol=1e-7)
 
 
 def test_what_the_flow_does_not_follow_can_be_ignored_or_stop_the_branch() -> None:
@@ -283,7 +338,7 @@ def test_other_branches_begin_at_boundary_equilibria() -> None:
     other = fl.continuation(boundary, "alpha", (0.25, 0.6))
     assert other.points[0].state.codimension == 1
     assert codes(other)[:1] == ["PSN"]
-    with pytest.raises(fl.InputError, match="other branches begin at PD, BP and BE, not at EP"):
+    with pytest.raises(fl.InputError, match="other branches begin at PD, BP, BE and HB, not at EP"):
         fl.continuation(branch.special["EP"][0], "alpha", (0.25, 0.6))
 
 
@@ -422,3 +477,240 @@ def test_cycles_travel() -> None:
     again = pickle.loads(pickle.dumps(cycle))
     np.testing.assert_array_equal(again.y0, cycle.y0)
     assert again.derivative("F").period == cycle.derivative("F").period
+
+
+def test_curves_in_two_parameters_travel(tmp_path: Any) -> None:
+    system = friction(omega=0.55)
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "omega", (0.5, 0.6))
+    (crossing,) = branch.special["CS"]
+    curve = fl.continuation(crossing, ("F", "omega"), {"F": (0.38, 0.5), "omega": (0.1, 2.0)})
+    fl.cycles.save_branch(curve, tmp_path / "curve.json")
+    exact = float(POINTS["dry_friction_crossing_sliding"]["points"][2]["omega"])
+    for again in (
+        pickle.loads(pickle.dumps(curve)),
+        fl.cycles.load_branch(tmp_path / "curve.json", system),
+    ):
+        np.testing.assert_array_equal(again.values("omega"), curve.values("omega"))
+        assert abs(again.at(F=0.5).params["omega"] - exact) < 1e-10
+
+
+def test_the_data_of_branches_are_written_as_netcdf(tmp_path: Any) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("scipy.io")
+    cycles = fl.continuation(fl.limit_cycle(friction(omega=0.7), [1.0, 2.0]), "omega", (0.5, 0.9))
+    rests = fl.continuation(
+        fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4]), "alpha", (0.25, 0.6)
+    )
+    for branch, name in ((cycles, "multipliers"), (rests, "eigenvalues")):
+        path = tmp_path / f"{name}.nc"
+        branch.data.to_netcdf(path, engine="scipy")
+        with xarray.open_dataset(path, engine="scipy") as again:
+            assert again.attrs == branch.data.attrs
+            for variable, values in branch.data.items():
+                np.testing.assert_array_equal(again[variable].values, values.values)
+            parts = again[name]
+            found = parts.sel(part="real").values + 1j * parts.sel(part="imag").values
+        np.testing.assert_array_equal(found, getattr(branch, name))
+        assert np.any(found.imag != 0)
+    with pytest.raises(fl.InputError, match="multipliers: only branches of cycles"):
+        _ = rests.multipliers
+
+
+def test_doubled_branches_return_to_the_single_cycle() -> None:
+    # Between two period doublings, over two folds of the doubled cycle and two more grazings of the wall, at
+    # which it turns back: each direction finds the same points once.
+    cycle = fl.limit_cycle(impacts("impact_flip", omega="2.4", s="0"), [0.001, 0.67], t0=2.49)
+    single = fl.continuation(cycle, "omega", (0.95, 2.9))
+    exact = [float(point["omega"]) for point in POINTS["impact_flip"]["points"][:2]]
+    ways = [fl.continuation(point, "omega", (0.95, 2.9)) for point in single.special["PD"][:2]]
+    there, back = ([(s.code, s.params["omega"]) for s in way.special] for way in ways)
+    for way, end in zip(ways, exact[::-1], strict=True):
+        assert "comes back to one of half the period" in way.reasons["above"]
+        assert abs(way.special[-1].params["omega"] - end) < 1e-8
+        assert abs(way.special[-1].state.period * end - 2 * np.pi) < 1e-7
+    assert [code for code, _ in back] == ["GR", "LP", "PD", "PD", "LP", "GR", "PD"]
+    # The other direction sees them in the other order; its end is where this one starts.
+    np.testing.assert_allclose([at for _, at in there[:-1]], [at for _, at in back[-2::-1]], atol=1e-8)
+    for way in ways:
+        assert bool(way.admissible.all())
+
+
+def ring(t: float, z: Any, mu: float = 0.7) -> list[Any]:
+    """Return an unstable circle of radius mu, inside a wall at x = 1 that is slid on."""
+    x, y = z
+    grow = 0.05 * (x**2 + y**2 - mu**2)
+    outside = np.sign(x - 1) > 0
+    return [np.where(outside, -1.0, x * grow - y), np.where(outside, 0.0, y * grow + x)]
+
+
+def test_branches_turn_back_at_grazing_sliding() -> None:
+    # An unstable circle and a stable cycle that slides meet where the circle touches the wall, at mu = 1; the
+    # other side of it has neither.
+    system = fl.System(ring, n=2)
+    slides = fl.limit_cycle(system, [0.0, -0.9])
+    circle = fl.limit_cycle(system, [0.0, -0.7], period=6.28, transient=0)
+    for start in (slides, circle):
+        branch = fl.continuation(start, "mu", (0.5, 1.2))
+        (grazing,) = branch.special["GS"]
+        assert abs(grazing.params["mu"] - 1.0) < 1e-8
+        assert branch.reasons["above"] == "mu = 0.5 is the end of the range"
+        assert bool(branch.admissible.all())
+        assert np.max(branch.values("mu")) < 1.0 + 1e-8
+        assert np.array_equal(branch.stable, branch.data.n_zero.values == 1)
+        for cycle in (branch.points[0].state, branch.points[-1].state):
+            n_legs = len(cycle.itinerary.legs)
+            assert n_legs == (2 if cycle.is_stable else 1)
+    again = fl.limit_cycle(system, [0.0, -0.9], {"mu": 0.5})
+    ends = [branch.points[k].state for k in (0, -1)]
+    assert min(abs(again.period - end.period) for end in ends) < 1e-9
+
+
+def test_branches_turn_back_where_an_impact_begins() -> None:
+    # From the cycle without impacts, to the fold of the cycles with one, which is beyond the grazing.
+    system = impacts("impact_fold", omega="1.8", s="-0.5")
+    w, size = 1.8, (1 - 1.8**2) ** 2 + (0.1 * 1.8) ** 2
+    free = fl.limit_cycle(system, [(1 - w**2) / size, 0.1 * w**2 / size], transient=3)
+    branch = fl.continuation(free, "omega", (1.5, 2.2))
+    grazing = float(POINTS["impact_grazing"]["points"][0]["omega"])
+    fold = float(POINTS["impact_fold"]["points"][0]["omega"])
+    assert abs(branch.special["GR"][0].params["omega"] - grazing) < 1e-8
+    assert abs(branch.special["LP"][0].params["omega"] - fold) < 1e-8
+    assert bool(branch.admissible.all())
+
+
+def test_a_curve_ends_where_something_else_happens_on_it() -> None:
+    # Closed form: the slip lasts for 2 pi, from rest at y = F - 1 to rest at 1 - F, where sticking begins
+    # with a force at its bound. A multiplier is 1 there too, and the equations are singular.
+    branch = fl.continuation(fl.limit_cycle(friction(omega=0.22), [1.0, 2.0]), "omega", (0.2, 0.25))
+    curve = fl.continuation(branch.special["AS"][0], ("F", "omega"), {"F": (0.01, 0.41), "omega": (0.1, 0.4)})
+    (end,) = curve.special["SS"]
+    force, omega = end.params["F"], end.params["omega"]
+    assert abs((1 - force) * (1 - omega**2) - (1 - 2 * force)) < 1e-7
+    assert abs(np.sin(np.pi * omega) - (1 - 2 * force)) < 1e-7
+    assert "switching-sliding, on a curve of AS" in curve.reason
+
+
+def around(t: float, z: Any, mu: float = -0.5, a: float = 1.0) -> list[Any]:
+    """Return the normal form of a Hopf bifurcation, in the plane w = x / 10 that is slid on."""
+    x, y, w = z
+    grow = mu - a * (x**2 + y**2)
+    f, g = x * grow - 2 * y, y * grow + 2 * x
+    return [f, g, 0.1 * f - np.sign(w - 0.1 * x)]
+
+
+@pytest.mark.parametrize("a", [1.0, -1.0], ids=["supercritical", "subcritical"])
+def test_cycles_begin_at_a_hopf_point_of_the_sliding_motion(a: float) -> None:
+    rest = fl.equilibrium(fl.System(around, n=3, params={"mu": -0.5, "a": a}), np.zeros(3), mode="0")
+    rests = fl.continuation(rest, "mu", (-1.0, 1.0))
+    (hopf,) = rests.special["HB"]
+    assert abs(hopf.params["mu"]) < 1e-10
+    cycles = fl.continuation(hopf, "mu", (-1.0, 1.0))
+    assert cycles.reasons == {
+        "below": f"it starts at {hopf!r}",
+        "above": f"mu = {a:g} is the end of the range",
+    }
+    for point in cycles.points:
+        cycle, mu = point.state, point.params["mu"]
+        assert abs(np.sum(cycle.y0[:2] ** 2) - mu / a) < 1e-10
+        assert abs(cycle.y0[2] - 0.1 * cycle.y0[0]) < 1e-12
+        assert abs(cycle.period - np.pi) < 1e-10
+        # The radius r has r' = r (mu - a r^2), of which -2 mu is the slope.
+        found = np.sort(np.abs(cycle.multipliers))
+        np.testing.assert_allclose(found, np.sort([0.0, 1.0, np.exp(-2 * np.pi * mu)]), rtol=1e-8)
+        assert cycle.n_zero == 1
+        assert cycle.is_stable == (a > 0)
+
+
+def test_cycles_begin_at_a_hopf_point_of_a_region() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    (hopf,) = fl.continuation(start, "d", (0.3, 0.6)).special["HB"]
+    cycles = fl.continuation(hopf, "d", (0.3, 0.6))
+    # The predators stay below the threshold, until the cycle grazes it; then it slides.
+    (grazing,) = cycles.special["GS"]
+    highest = np.max(grazing.state.solution.sol(np.linspace(0, grazing.state.period, 20001))[1])
+    assert abs(highest - 0.45) < 1e-7
+    d = 0.45
+    run = fl.limit_cycle(harvest("harvest_equilibria", alpha="0.45"), [0.3, 0.3], {"d": d})
+    assert abs(cycles.at(d=d).period - run.period) < 1e-9
+
+
+def test_a_cycle_that_slides_for_ever() -> None:
+    cycle = fl.limit_cycle(fl.System(around, n=3), [0.3, 0.2, 0.5], {"mu": 0.4})
+    assert [str(mode) for mode in cycle.modes] == ["0"]
+    assert abs(cycle.period - np.pi) < 1e-10
+    assert cycle.n_zero == 1
+    assert abs(np.hypot(*cycle.y0[:2]) - np.sqrt(0.4)) < 1e-10
+
+
+def turning(t: float, z: Any, a: float = 0.7, b: float = 0.6) -> list[Any]:
+    """Return a circle of radius 1 that is gone round faster where x > a, and where y > b."""
+    x, y = z
+    speed = 1.0 + 0.2 * (x > a) + 0.1 * (y > b)
+    grow = 1.0 - x**2 - y**2
+    return [x * grow - speed * y, y * grow + speed * x]
+
+
+def test_corners_where_two_surfaces_are_met_at_once() -> None:
+    branch = fl.continuation(fl.limit_cycle(fl.System(turning, n=2), [0.5, 0.1]), "a", (0.5, 0.95))
+    (corner,) = branch.special["CO"]
+    assert abs(corner.params["a"] - 0.8) < 1e-10
+    assert codes(branch) == ["EP", "CO", "EP"]
+    assert bool(branch.admissible.all())
+    for a in (0.6, 0.9):
+        fast_x, fast_y = 2 * np.arccos(a), np.pi - 2 * np.arcsin(0.6)
+        both = max(0.0, np.arccos(a) - np.arcsin(0.6))
+        parts = (both, fast_x - both, fast_y - both, 2 * np.pi - fast_x - fast_y + both)
+        period = sum(part / speed for part, speed in zip(parts, (1.3, 1.2, 1.1, 1.0), strict=True))
+        assert abs(branch.at(a=a).period - period) < 1e-10
+    curve = fl.continuation(corner, ("a", "b"), {"a": (0.3, 0.95), "b": (0.3, 0.95)})
+    np.testing.assert_allclose(curve.values("a") ** 2 + curve.values("b") ** 2, 1.0, atol=1e-9)
+    assert len(curve) > 10
+
+
+def test_two_folds_at_the_end_of_sliding() -> None:
+    # Both fields are tangent to the surface at sin(t) = 1/2 if mu = 0. Before, sliding ends upwards there;
+    # behind, it ends downwards, earlier: the cycle jumps, and two branches end at the same point.
+    def fun(t: float, x: Any, mu: float = 0.3) -> list[Any]:
+        push = np.sin(t) - 0.5
+        return [np.where(x[0] > 0, push, mu - 2 * push)]
+
+    for mu, way in ((0.2, "below"), (-0.2, "above")):
+        branch = fl.continuation(fl.limit_cycle(fl.System(fun, n=1), [0.2], {"mu": mu}), "mu", (-0.4, 0.4))
+        (fold,) = branch.special["TF"]
+        assert abs(fold.params["mu"]) < 1e-10
+        assert abs(np.sin(fold.t) - 0.5) < 1e-9
+        assert branch.reasons[way].startswith("behind TF")
+        assert abs(branch.values("mu")[0 if way == "below" else -1]) < 0.02
+        assert np.all(np.sign(branch.values("mu")) == np.sign(mu))
+        for point in branch.points:
+            assert {str(mode) for mode in point.state.modes} == ({"0", "+"} if mu > 0 else {"0", "-"})
+            legs = point.state.itinerary.legs
+            end = next(leg.ending.time for leg in legs if leg.mode == (0,) and leg.ending)
+            assert abs(np.sin(end) - 0.5 - min(0.0, point.params["mu"] / 2)) < 1e-9
+
+
+@pytest.mark.parametrize("eps", [0.3, -0.3], ids=["unstable saddle side", "reversed"])
+def test_a_branch_ends_at_a_homoclinic_orbit(eps: float) -> None:
+    # The cycles are the curves H = mu of an energy H, from the bottom of a well to the separatrix at H = 0.
+    def well(t: float, z: Any, mu: float = -0.3, eps: float = 0.3) -> list[Any]:
+        x, y = z
+        return [y, x - x**3 + eps * y * (mu - (y**2 / 2 - x**2 / 2 + x**4 / 4))]
+
+    system = fl.System(well, n=2, params={"mu": -0.3, "eps": eps})
+    rests = fl.continuation(fl.equilibrium(system, [0.9, 0.0]), "mu", (-0.5, 0.2))
+    (hopf,) = rests.special["HB"]
+    assert abs(hopf.params["mu"] + 0.25) < 1e-10
+    branch = fl.continuation(hopf, "mu", (-0.5, 0.2))
+    assert "the period grows without bound" in branch.reasons["above"]
+    assert abs(branch.values("mu")[-1]) < 1e-8
+    assert branch.values("period")[-1] > 20
+    assert codes(branch) == []
+    for point in branch.points:
+        x, y = point.state.y0
+        assert abs(y**2 / 2 - x**2 / 2 + x**4 / 4 - point.params["mu"]) < 1e-8
+    far = branch.at(mu=-1e-4)
+    assert len(far.itinerary.legs) == 1
+    # One multiplier is 1, and both have the product of the mean divergence, here of mu - H - y^2.
+    assert far.trivial_error < 1e-6
+    assert far.is_stable == (eps > 0)
+    assert far.is_admissible

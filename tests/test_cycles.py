@@ -73,6 +73,9 @@ def test_block_on_a_belt_starts_where_a_section_says() -> None:
     cycle = fl.limit_cycle(system_of(case), [0.1, 0.0], section=departs)
     check(cycle, case)
     np.testing.assert_allclose(cycle.y0, [1.0, 0.2], atol=1e-10)
+    sticks = case["stick_starts"]
+    assert abs(cycle.itinerary.durations[0] - float(sticks["t"])) < 1e-10
+    assert abs(cycle.itinerary.starts[1][0] - float(sticks["x"])) < 1e-10
     np.testing.assert_allclose(cycle.monodromy, numbers(case["monodromy"]), rtol=0, atol=1e-8)
 
 
@@ -87,20 +90,46 @@ def test_relay_feedback_of_third_order() -> None:
         np.testing.assert_allclose(cycle.derivative(name).y0[1:], [float(v) for v in exact], atol=1e-8)
 
 
-@pytest.mark.parametrize("u", [1, 3])
-def test_drill_string(u: int) -> None:
+def check_from_start(cycle: fl.Cycle, case: dict[str, Any]) -> None:
+    """Compare also the start, the monodromy matrix from there, and what happens on the way."""
+    check(cycle, case)
+    np.testing.assert_allclose(cycle.y0, [float(v) for v in case["start"]["y"]], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(cycle.monodromy, numbers(case["monodromy"]), rtol=0, atol=1e-8)
+    modes = [tuple(leg.mode) for leg in cycle.itinerary.legs[1:]]
+    events = [event for event in case["events"] if not is_end(event, case)]
+    assert modes == [tuple(mode_after(event)) for event in events]
+
+
+def mode_after(event: Any) -> Any:
+    return event["mode_after"] if isinstance(event, dict) else event[2]
+
+
+def is_end(event: Any, case: dict[str, Any]) -> bool:
+    """Whether an event of a reference is that from which the cycle starts again."""
+    return isinstance(event, dict) and abs(float(event["t"]) - float(case["period"])) < 1e-10
+
+
+@pytest.mark.parametrize(("u", "component"), [(1, 2), (3, 0)])
+def test_drill_string(u: int, component: int) -> None:
     case = CYCLES[f"drill_cycle_u{u}"]
     system = fl.System(drill_string.rhs, n=3, params={"u": float(u)})
-    cycle = fl.limit_cycle(system, [float(v) for v in case["start"]["y"]])
-    check(cycle, case)
+    start = [float(v) for v in case["start"]["y"]]
+    rate = float(system.field(0.0, np.array(start), (1, 1))[component])
+    section = fl.Event(lambda t, y: y[component] - start[component], direction=int(np.sign(rate)))
+    check_from_start(fl.limit_cycle(system, start, section=section), case)
 
 
 @pytest.mark.parametrize("name", ["harvest_sliding_e0.3", "harvest_crossing_e0.1"])
 def test_harvested_predators(name: str) -> None:
     case = CYCLES[name]
     start = [float(v) for v in case["start"]["y"]]
-    cycle = fl.limit_cycle(system_of(case), [start[0] + 0.01, start[1] - 0.01])
-    check(cycle, case)
+    section = fl.Event(lambda t, y: y[0] - start[0], direction=-1)
+    cycle = fl.limit_cycle(system_of(case), [start[0] + 0.01, start[1] - 0.01], section=section)
+    check_from_start(cycle, case)
+    ends = [event for event in case["events"] if is_end(event, case)]
+    assert len(ends) == 1
+    for duration, event in zip(np.cumsum(cycle.itinerary.durations), case["events"], strict=True):
+        assert abs(duration - float(event["t"])) < 1e-10
 
 
 @pytest.mark.parametrize("name", [name for name in CYCLES if name.startswith("impact")])
@@ -115,6 +144,14 @@ def test_impact_oscillators(name: str) -> None:
     impact = next(leg.ending for leg in cycle.itinerary.legs if leg.ending is not None)
     assert abs(math.remainder(impact.time - t0, cycle.period)) < 1e-10
     np.testing.assert_allclose(cycle.itinerary.starts[1], y0, rtol=0, atol=1e-10)
+    strikes = fl.Event(lambda t, x, s: x[0] - s, direction=-1)
+    again = fl.limit_cycle(system, y0, itinerary=cycle, section=strikes)
+    np.testing.assert_allclose(again.y0, y0, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(again.monodromy, numbers(case["monodromy"]), rtol=0, atol=1e-8)
+    before = again.at(again.t0, before=True)
+    np.testing.assert_allclose(before, [y0[0], float(case["velocity_before"])], rtol=0, atol=1e-10)
+    run = system.solve((t0 + 0.1, t0 + 1.2 * cycle.period), cycle.at(t0 + 0.1), wrt="y0", rtol=1e-12)
+    np.testing.assert_allclose(run.switches[0].saltation, numbers(case["saltation"]), rtol=0, atol=1e-8)
     for row in case["derivatives"]:
         found = cycle.derivative(row["parameter"])
         assert abs(found.states[0, 1] - float(row["v_after"])) < 1e-7
@@ -225,3 +262,56 @@ def test_a_reset_that_forgets_the_state_keeps_the_delay() -> None:
     assert cycle.n_zero == 0
     np.testing.assert_allclose(cycle.multipliers, [1.0], atol=1e-10)
     assert cycle.is_stable
+
+
+@pytest.mark.parametrize(
+    ("fun", "period"),
+    [
+        (lambda t, x: [x[1], -4 * x[0]], lambda start: np.pi),
+        # A quarter of a turn lasts as long as its square side, abs(x) + abs(y).
+        (lambda t, x: [np.sign(x[1]), -np.sign(x[0])], lambda start: 4 * np.sum(np.abs(start))),
+    ],
+    ids=["harmonic", "two relays"],
+)
+def test_one_cycle_of_a_family_is_neutral(fun: Any, period: Any) -> None:
+    cycle = fl.limit_cycle(fl.System(fun, n=2), [1.0, 0.3])
+    assert abs(cycle.period - period(cycle.y0)) < 1e-9
+    np.testing.assert_allclose(np.abs(cycle.multipliers), 1.0, atol=1e-6)
+    assert "neutral" in repr(cycle)
+
+
+def test_a_cycle_of_a_family_has_no_derivative() -> None:
+    center = fl.System(lambda t, x, k=2.0: [x[1], -k * x[0]], n=2)
+    with pytest.raises(fl.ModelError, match="family"):
+        fl.limit_cycle(center, [1.0, 0.3]).derivative("k")
+
+
+def test_an_equilibrium_is_no_cycle() -> None:
+    # Its period would be whatever the guess is.
+    center = fl.System(lambda t, x: [x[1], -x[0]], n=2)
+    with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
+        fl.limit_cycle(center, [1.0, 0.3], period=6.0, transient=0)
+
+
+def test_cycles_along_which_perturbations_grow_very_much() -> None:
+    # Backwards in time the cycle of van der Pol is unstable; that of the other direction is the guess.
+    def ahead(t: float, x: Any, mu: float = 1.0, sense: float = 1.0) -> list[Any]:
+        return [sense * x[1], sense * (mu * (1 - x[0] ** 2) * x[1] - x[0])]
+
+    system = fl.System(ahead, n=2)
+    stable = fl.limit_cycle(system, [1.0, 0.0])
+    assert abs(stable.period - 6.663286859323) < 1e-9
+    start = fl.limit_cycle(system, stable.y0, {"sense": -1.0}, period=stable.period, transient=0)
+    assert abs(start.period - stable.period) < 1e-9
+    assert abs(float(np.max(start.multipliers.real)) * float(stable.nontrivial[0].real) - 1) < 1e-6
+    branch = fl.continuation(start, "mu", (0.9, 4.0))
+    assert branch.reasons["above"] == "mu = 4 is the end of the range"
+    for mu in (2.0, 3.0, 4.0):
+        there, forwards = branch.at(mu=mu), fl.limit_cycle(system, [1.0, 0.0], {"mu": mu})
+        assert abs(there.period - forwards.period) < 1e-9
+        assert len(there.modes) == 1
+        assert not there.is_stable
+        assert there.is_admissible
+        # Along them perturbations grow by more than 1e18 at mu = 4.
+        growth = np.log(float(np.max(np.abs(there.multipliers))))
+        assert growth > 10 * mu - 4

@@ -8,12 +8,13 @@ is constant and the cycle loses its sticking: it becomes the circle of radius vd
 
 With a damper, c = 0.1, the equilibrium is stable on a fast belt. It becomes so at a Hopf point (HB), where
 an unstable cycle begins. This cycle grows with vdr until it touches the belt at a grazing-sliding point (GS),
-and there it meets the stick-slip cycle: both end. Between the two points a push decides whether the block
-comes to rest or squeaks; beyond the second it always comes to rest. The Hopf point has a closed form,
+and there it meets the stick-slip cycle: the branch turns back. Between the two points a push decides whether
+the block comes to rest or squeaks; beyond the second it always comes to rest. The Hopf point has a closed form,
 
     c = Fs delta / (1 + delta vdr)^2,
 
-and both cycles have to come to the same grazing-sliding point. This point is followed in vdr and delta.
+and the branch from it has to come to the same grazing-sliding point as that of the stick-slip cycle. This
+point is followed in vdr and delta.
 
 Leine, van Campen, de Kraker, van den Steen, Nonlinear Dynamics 16 (1998) 41-54.
 Run it with ``python examples/33_belt_branch/belt_branch.py [picture.png]``.
@@ -76,19 +77,17 @@ def damped() -> tuple[list[fl.Branch], list[fl.Branch]]:
     """Return the branches over vdr with a damper, and the curves of their special points in vdr and delta."""
     rests = fl.continuation(fl.equilibrium(belt, [0.4, 0.0], DAMPED), "vdr", (0.05, 3.5), monitor=monitors)
     (hopf,) = rests.special["HB"]
+    bounds = (0.1, 3.5)
+    cycles = fl.continuation(hopf, "vdr", bounds, monitor=monitors, detect=["GS"])
     sticks = fl.continuation(
-        fl.limit_cycle(belt, [0.1, 0.0], DAMPED), "vdr", (0.1, 2.8925), monitor=monitors, detect=["GS"]
+        fl.limit_cycle(belt, [0.1, 0.0], DAMPED), "vdr", bounds, monitor=monitors, detect=["GS"]
     )
-    # The unstable cycle is near the equilibrium, beside the Hopf point.
-    vdr = hopf.params["vdr"] + 0.1
-    guess = rests.at(vdr=vdr).y + np.array([0.0, 0.7])
-    small = fl.limit_cycle(belt, guess, {**DAMPED, "vdr": vdr}, period=2 * math.pi, transient=0)
-    bounds = (hopf.params["vdr"] + 1e-2, 3.5)
-    slips = fl.continuation(small, "vdr", bounds, monitor=monitors, detect=["GS"], switch="stop")
-    print(hopf, sticks.special, slips.special, sep="\n")
-    assert sticks.points[0].state.is_stable
-    assert not slips.stable.any()
-    (touch,) = slips.special
+    print(hopf, cycles.special, cycles.reason, sticks.special, sticks.reason, sep="\n")
+    # From the Hopf point over the grazing to the slowest belt, and the other way.
+    assert not cycles.stable[0]
+    assert cycles.stable[-1]
+    assert "shrinks to an equilibrium" in sticks.reasons["above"]
+    (touch,) = cycles.special["GS"]
     numbers = {"Hopf, vdr": (hopf.params["vdr"], (math.sqrt(30.0) - 1) / 3)}
     numbers["GS, from both sides"] = (sticks.special["GS"][0].params["vdr"], touch.params["vdr"])
     print(compare(numbers, within=1e-7))
@@ -97,7 +96,7 @@ def damped() -> tuple[list[fl.Branch], list[fl.Branch]]:
     for point in curves[0].points:
         vdr, delta = point.params["vdr"], point.params["delta"]
         assert abs(delta / (1 + delta * vdr) ** 2 - DAMPED["c"]) < 1e-7
-    return [rests, sticks, slips], curves
+    return [rests, cycles, sticks], curves
 
 
 @fl.plot.style()
@@ -106,8 +105,8 @@ def main(path: Path) -> None:
     branches, curves = damped()
     figure, axes = pyplot.subplots(2, 2, figsize=(11.0, 9.0), layout="constrained")
     (over_speed, plane), (window, over_friction) = axes
-    labels = ["equilibrium", "stick-slip", "slip"]
-    fl.plot.branches(branches, "vdr", "amplitude", ax=over_speed, labels=labels)
+    labels = ["equilibrium", "cycle"]
+    fl.plot.branches(branches[:2], "vdr", "amplitude", ax=over_speed, labels=labels)
     over_speed.set_title("c = 0.1, delta = 3", fontsize="medium")
     fl.plot.branches(curves, "vdr", "delta", ax=plane, labels=["Hopf", "grazing-sliding"])
     plane.set_title("c = 0.1", fontsize="medium")

@@ -390,7 +390,7 @@ def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None
     if isinstance(progress, Report):
         return progress
     if callable(progress):
-        return Report(progress)
+        return Report(lambda t, *_: progress(t))
     raise InputError("progress: True, False, or a function of the time reached, is needed")
 
 

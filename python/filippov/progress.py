@@ -137,7 +137,8 @@ class Report:
     Parameters
     ----------
     function : callable
-        Of the time that a run reached, and for many runs of the number of those that are finished.
+        Of the time that a run reached and of the number of switches in one place there, if they are very many;
+        for many runs of the time and of the number of those that are finished.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -169,9 +170,11 @@ class _BarOfTime:
         self._bar = Bar(length if math.isfinite(length) else None, "t", name, delay=delay)
         self._is_shifted = self._start != 0.0
 
-    def __call__(self, t: float, *_: Any) -> None:
+    def __call__(self, t: float, n_switches_here: int = 0) -> None:
         done = self._sign * (t - self._start)
-        self._bar.to(done, f"t = {t:.6g}" if self._is_shifted else "")
+        place = f"t = {t:.6g}" if self._is_shifted else ""
+        here = f"{n_switches_here} switches in one place" if n_switches_here else ""
+        self._bar.to(done, ", ".join(note for note in (place, here) if note))
         if self._bar.total is not None and done >= self._bar.total:
             self._bar.close()
 
@@ -194,7 +197,7 @@ def print_progress(t_span: tuple[float, float], name: str = "", delay: float = 0
     Returns
     -------
     callable
-        ``report(t)``; further arguments are ignored.
+        ``report(t, n_switches_here=0)``: very many switches in one place are named.
     """
     return _BarOfTime(t_span, name, delay)
 

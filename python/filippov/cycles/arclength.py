@@ -16,6 +16,7 @@ __all__ = ["Curve", "Step", "corrected", "tangent_of"]
 
 _TOLERANCE = 1e-11
 _MOST_STEPS = 12
+_ABSURD, _NEAR = 1e4, 1e-7
 
 
 class Curve(Protocol):
@@ -92,11 +93,11 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
         except np.linalg.LinAlgError:
             change = -np.linalg.lstsq(matrix, right, rcond=None)[0]
         size = float(np.max(np.abs(change)))
-        if not np.isfinite(size):
+        if not size < _ABSURD:
             break
         w = w + change * scale
-        # Newton's method squares what is left.
-        squares = curve.is_exact and size < 1e-2 * before < np.inf
+        # Newton's method squares what is left, once it is near.
+        squares = curve.is_exact and size < _NEAR and size < 1e-2 * before < np.inf
         left = size**3 / before**2 if squares else size
         if left < _TOLERANCE or (size < 1e-8 and size > 0.5 * before):
             return Step(w, jacobian, count, left)

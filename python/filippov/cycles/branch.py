@@ -30,6 +30,8 @@ CODES = {
     "SS": "switching-sliding",
     "AS": "adding-sliding",
     "GR": "grazing of a reset",
+    "CO": "corner: two boundaries at once",
+    "TF": "two-fold",
     "CP": "degenerate point",
     "UZ": "a monitor vanishes",
     "EP": "end",
@@ -37,7 +39,7 @@ CODES = {
 
 
 # At these the flow takes another itinerary.
-CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
+CHANGES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF", "BE")
 
 
 class Point(NamedTuple):
@@ -61,7 +63,7 @@ class Point(NamedTuple):
         """Whether the flow follows the itinerary there: all its test functions are positive."""
         if isinstance(self.state, Equilibrium):
             return self.state.is_admissible
-        return all(value > 0 for key, value in self.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))
+        return all(value > 0 for key, value in self.tests.items() if key[0] in CHANGES)
 
 
 class Special(NamedTuple):
@@ -222,6 +224,35 @@ class Branch:
         return np.array([point.state.is_stable for point in self.points])
 
     @property
+    def multipliers(self) -> Any:
+        """The multipliers of the cycles, complex, of shape (points, n).
+
+        Raises
+        ------
+        InputError
+            If the branch is one of equilibria.
+        """
+        self._refuse_kind(Cycle, "multipliers")
+        return np.array([_multipliers(point.state) for point in self.points])
+
+    @property
+    def eigenvalues(self) -> Any:
+        """The eigenvalues of the equilibria, complex, of shape (points, n); NaN where sliding takes some.
+
+        Raises
+        ------
+        InputError
+            If the branch is one of cycles.
+        """
+        self._refuse_kind(Equilibrium, "eigenvalues")
+        return _padded([_eigenvalues(point.state) for point in self.points])
+
+    def _refuse_kind(self, wanted: type, name: str) -> None:
+        if not isinstance(self.points[0].state, wanted):
+            what = "cycles" if wanted is Cycle else "equilibria"
+            raise InputError(f"{name}: only branches of {what} have them")
+
+    @property
     def admissible(self) -> Any:
         """Whether the flow follows each point, an array of bool."""
         return np.array([point.is_admissible for point in self.points])
@@ -253,7 +284,12 @@ class Branch:
 
     @property
     def data(self) -> Any:
-        """The branch as an xarray Dataset with the dimension `point`."""
+        """The branch as an xarray Dataset with the dimension `point`.
+
+        Files of NetCDF have no complex numbers: `multipliers` and `eigenvalues` have the dimension `part`,
+        for the real and the imaginary part. As complex arrays they are `Branch.multipliers` and
+        `Branch.eigenvalues`.
+        """
         xarray = need("xarray", "a branch as a Dataset")
         first = self.points[0].state
         variables: dict[str, Any] = {name: ("point", self.values(name)) for name in self.names}
@@ -264,15 +300,15 @@ class Branch:
         states = [point.state for point in self.points]
         if isinstance(first, Cycle):
             variables["period"] = ("point", self.values("period"))
-            variables["multipliers"] = (("point", "multiplier"), np.array([_multipliers(s) for s in states]))
+            variables["multipliers"] = (("point", "multiplier", "part"), _parts(self.multipliers))
             variables["n_zero"] = ("point", np.array([_n_zero(s) for s in states]))
         else:
-            variables["eigenvalues"] = (("point", "eigenvalue"), _padded([_eigenvalues(s) for s in states]))
+            variables["eigenvalues"] = (("point", "eigenvalue", "part"), _parts(self.eigenvalues))
         variables["stable"] = ("point", self.stable)
         variables["itinerary"] = ("point", np.array([_itinerary_text(s) for s in states]))
         variables["admissible"] = ("point", self.admissible)
         variables["residual"] = ("point", np.array([s.residual for s in states]))
-        return xarray.Dataset(variables, attrs={"reason": self.reason})
+        return xarray.Dataset(variables, {"part": ["real", "imag"]}, {"reason": self.reason})
 
     def plot(self, x: str | None = None, y: str | None = None, ax: Any = None, **options: Any) -> Any:
         """Draw one quantity over another, stable parts as lines, unstable ones dashed, special points named.
@@ -335,6 +371,11 @@ def _padded(rows: Sequence[Any]) -> Any:
     for out, row in zip(found, rows, strict=True):
         out[: len(row)] = row
     return found
+
+
+def _parts(values: Any) -> Any:
+    """Return real and imaginary parts along a last dimension."""
+    return np.stack([values.real, values.imag], axis=-1)
 
 
 def _itinerary_text(state: State) -> str:

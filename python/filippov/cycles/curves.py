@@ -6,7 +6,7 @@ chapter 8.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,10 +25,10 @@ from filippov.progress import BranchBar
 from filippov.scalars import positive
 from filippov.unknown import did_you_mean
 
-__all__ = ["curve_in_two"]
+__all__ = ["OnCurve", "curve_in_two"]
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.04, 1e-6
-_PROBES = ("CS", "SS", "GS", "AS", "GR")
+_PROBES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF")
 
 
 class _Condition(Protocol):
@@ -184,11 +184,7 @@ def curve_in_two(
     special = [s._replace(point=max(last - s.point - 1, 0)) for s in sides[0].special[::-1]]
     special += [s._replace(point=s.point + last) for s in sides[1].special]
     reasons = {"one way": sides[0].reason, "other way": sides[1].reason}
-
-    def at_value(near: State, name: str, value: float) -> State:
-        return _at_value(start, near, (names, sizes), name, value)
-
-    return Branch(points, special, reasons, names, at_value=at_value)
+    return Branch(points, special, reasons, names, at_value=OnCurve(start, names, sizes))
 
 
 def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
@@ -198,19 +194,31 @@ def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
     return _Extended(curve, _SpectralCondition(curve, start))
 
 
-def _at_value(
-    start: Special, near: State, parameters: tuple[tuple[str, ...], Sequence[float]], name: str, value: float
-) -> State:
-    """Return the point of the curve of a special point at a value of one of the parameters."""
-    names, sizes = parameters
-    curve, w = curve_of(near, names, tuple(sizes))
-    extended = _extended(curve, start, w)
-    place = len(w) - 2 + names.index(name)
-    unit = np.zeros(len(w))
-    unit[place] = 1.0
-    w[place] = value
-    point = corrected(extended, w, curve.scales(w), unit)
-    return curve.state(point.w, point.error)
+class OnCurve:
+    """The points of the curve of a special point, by the value of one of both parameters.
+
+    Parameters
+    ----------
+    start : Special
+    names : tuple of str
+        The parameters.
+    sizes : tuple of float
+        The sizes by which they are measured.
+    """
+
+    def __init__(self, start: Special, names: tuple[str, ...], sizes: tuple[float, ...]) -> None:
+        self.start, self.names, self.sizes = start, names, sizes
+
+    def __call__(self, near: State, name: str, value: float) -> State:
+        """Return the point at a value of a parameter, near another one."""
+        curve, w = curve_of(near, self.names, self.sizes)
+        extended = _extended(curve, self.start, w)
+        place = len(w) - 2 + self.names.index(name)
+        unit = np.zeros(len(w))
+        unit[place] = 1.0
+        w[place] = value
+        point = corrected(extended, w, curve.scales(w), unit)
+        return curve.state(point.w, point.error)
 
 
 class _CurveSide:
@@ -227,7 +235,7 @@ class _CurveSide:
     ) -> None:
         self.bar = bar
         self.names, self.ranges, self.sizes, self.code = names, ranges, sizes, start.code
-        self.special_start = start
+        self.own = start.test
         curve, w = curve_of(start.state, names, sizes)
         self.extended = _extended(curve, start, w)
         scale = curve.scales(w)
@@ -242,7 +250,7 @@ class _CurveSide:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason = ""
-        self.trail: list[tuple[Array, float]] = []
+        self.trail: list[tuple[Array, dict[Any, float]]] = []
         # Symmetric cycles meet their condition in several places.
         alike = self._tests(self.w, ())
         self.together = {key for key, value in alike.items() if abs(value) < 1e-7}
@@ -258,17 +266,16 @@ class _CurveSide:
             found.update({p.key: p.value for p in probes})
         if self.code != "GR":  # at an impact without speed the multipliers are infinite
             found.update(singular_values_of(curve, w))
-        own = self.special_start.test
         return {
             key: value
             for key, value in found.items()
-            if key != own and key not in without and np.isfinite(value)
+            if key != self.own and key not in without and np.isfinite(value)
         }
 
     def _keep(self, point: Step) -> None:
         self.extended.condition.keep(self.w)
         self.tests = self._tests(self.w)
-        self.trail.append((self.w, self.tests.get(("degenerate",), np.nan)))
+        self.trail.append((self.w, self.tests))
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
         state = self.extended.curve.state(self.w, point.error)
         self.points.append(Point(params, state, self.tests))
@@ -301,27 +308,37 @@ class _CurveSide:
         self.reason = f"{most} points"
 
     def _ends_nearby(self) -> bool:
-        """Whether the condition is degenerate just behind, where the equations are singular too."""
-        key = ("degenerate",)
-        # Of points that are too near the difference is noise.
-        latest: list[tuple[Array, float]] = []
-        for w, value in reversed(self.trail):
-            is_far = abs(value) > 3e-3 * abs(self.trail[0][1])
-            if is_far and (not latest or abs(value) > 1.6 * abs(latest[-1][1])):
-                latest.append((w, value))
-        latest = latest[:4]
-        values = [value for _, value in latest]
-        if len(values) < 4 or min(values) * max(values) < 0 or abs(values[0]) > 0.5 * abs(self.trail[0][1]):
+        """Whether more vanishes just ahead, where the equations are singular too."""
+        near = self._vanishing_ahead()
+        if not near:
             return False
-        # Inverse interpolation: the point as a function of the next derivative, at 0.
-        weights = [np.prod([b / (b - a) for b in values if b != a]) for a in values]
-        w = sum(weight * point for weight, (point, _) in zip(weights, latest, strict=True))
+        (_, key, w), others = near[0], near[1:]
+        also = {CODES[other[0]] for _, other, _ in others if other[0] in CODES and other[0] != key[0]}
+        kind = " and ".join([_kind(key, self.code), *sorted(also)])
+        code = "CP" if key == ("degenerate",) else key[0]
         params = dict(zip(self.names, map(float, w[-2:]), strict=True))
-        kind = f"{CODES['CP']} of {self.code}"
         state = self.points[-1].state
-        self.special.append(Special("CP", kind, "", np.nan, params, len(self.points) - 1, state, key))
+        self.special.append(Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key))
         self.reason = f"the flow follows the curve no further than {self._where(w)}: {kind}"
         return True
+
+    def _vanishing_ahead(self) -> list[tuple[float, Any, Array]]:
+        """Return what vanishes just ahead, the nearest first: how far, the test function, and the point."""
+        scale = self.extended.scales(self.w)
+        found = []
+        for key in self.tests:
+            if key[0] not in (*_PROBES, "degenerate", "LP", "PD"):
+                continue
+            trail = [(w, tests[key]) for w, tests in self.trail if key in tests]
+            w = _zero_ahead(trail)
+            if w is not None and (w - self.w) / scale @ self.tangent > 0:
+                found.append((float(np.linalg.norm((w - self.w) / scale)), key, w))
+        # What changes the itinerary or ends the curve first; multipliers are what is lost together with it.
+        found.sort(key=lambda one: (one[1][0] in ("LP", "PD"), one[0]))
+        if not found or found[0][1][0] in ("LP", "PD") or found[0][0] > _LONGEST_STEP:
+            return []
+        first = found[0][2]
+        return [one for one in found if np.linalg.norm((one[2] - first) / scale) < 1e-3]
 
     def _step(self, ds: float) -> tuple[Step, Array]:
         scale = self.extended.scales(self.w)
@@ -337,7 +354,7 @@ class _CurveSide:
                 point = corrected(self.extended, guess, scale, unit)
                 point.w[place] = bound
         tangent = tangent_of(point.jacobian, self.extended.scales(point.w), self.tangent)
-        if tangent @ self.tangent < 0.7 and ds > 1e-5:
+        if tangent @ self.tangent < 0.9 and ds > 1e-5:
             raise ModelError("the curve turns too far in one step")
         return point, tangent
 
@@ -346,12 +363,7 @@ class _CurveSide:
         found = sorted((self._located(key, point, tests) for key in lost), key=lambda located: located[0])
         for _, key, there in found:
             is_degenerate = key[0] == "degenerate"
-            code = "CP" if is_degenerate else key[0]
-            kind = (
-                f"{CODES[code]} of {self.code}"
-                if is_degenerate
-                else f"{CODES[code]}, on a curve of {self.code}"
-            )
+            code, kind = "CP" if is_degenerate else key[0], _kind(key, self.code)
             params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
             state = self.extended.curve.state(there.w, there.error)
             special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
@@ -359,9 +371,9 @@ class _CurveSide:
                 continue
             self.special.append(special)
             if is_degenerate or code in _PROBES:
+                self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 self.w = there.w
                 self._keep(there)
-                self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 return False
         return True
 
@@ -389,6 +401,30 @@ class _CurveSide:
 
     def _where(self, w: Array) -> str:
         return ", ".join(f"{name} = {value:.10g}" for name, value in zip(self.names, w[-2:], strict=True))
+
+
+def _kind(key: Any, code: str) -> str:
+    """Return what a test function that vanishes on a curve means, in words."""
+    if key == ("degenerate",):
+        return f"{CODES['CP']} of {code}"
+    return f"{CODES[key[0]]}, on a curve of {code}"
+
+
+def _zero_ahead(trail: list[tuple[Array, float]]) -> Array | None:
+    """Return where a quantity along a curve vanishes behind its last point, by inverse interpolation."""
+    first = abs(trail[0][1])
+    # Of points that are too near the difference is noise.
+    latest: list[tuple[Array, float]] = []
+    for w, value in reversed(trail):
+        is_far = abs(value) > 3e-3 * first
+        if is_far and (not latest or abs(value) > 1.6 * abs(latest[-1][1])):
+            latest.append((w, value))
+    latest = latest[:4]
+    values = [value for _, value in latest]
+    if len(values) < 4 or min(values) * max(values) < 0 or abs(values[0]) > 0.5 * first:
+        return None
+    weights = [np.prod([b / (b - a) for b in values if b != a]) for a in values]
+    return np.asarray(sum(weight * point for weight, (point, _) in zip(weights, latest, strict=True)))
 
 
 def _is_unit(code: str, state: Any) -> bool:

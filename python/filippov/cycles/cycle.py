@@ -21,7 +21,8 @@ from filippov.cycles.forcing import (
 )
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.shooting import Period, Shooting, Shot, solve
+from filippov.cycles.probes import PLACES, end_probes_of, probes_of
+from filippov.cycles.shooting import Period, Shooting, Shot, divided, scales, solve
 from filippov.errors import InputError, ModelError
 from filippov.events import Event, accepted_names
 from filippov.modes import Mode
@@ -31,10 +32,11 @@ from filippov.solution import Solution
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
+__all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "in_parts", "limit_cycle", "turns_of"]
 
 _MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
+_SINGULAR, _ROUNDING = 1e-12, 1e-9
 
 
 class CycleDerivative(NamedTuple):
@@ -82,7 +84,8 @@ class Cycle:
         self._section = section
         motions = shooting.motions
         self.system, self.params = motions.system, motions.params
-        self.itinerary = shooting.itinerary(u)
+        self._parts = shooting.itinerary(u)
+        self.itinerary = self._parts.merged()
         self.t0, self.y0 = self.itinerary.t0, self.itinerary.starts[0].copy()
         self.period = self.itinerary.period
         self.residual = residual
@@ -106,10 +109,10 @@ class Cycle:
     @cached_property
     def n_zero(self) -> int:
         """How many multipliers are zero: sliding on m surfaces takes m of them, contact two for each."""
-        found = max(_codimension(self._shooting.motions, leg) for leg in self.itinerary.legs)
+        found = max(_codimension(self._shooting.motions, leg) for leg in self._parts.legs)
         n = self._shooting.n
         for k, passage in enumerate(self._shot.passages):
-            if self.itinerary.legs[k].ending is not None:
+            if self._parts.legs[k].ending is not None:
                 following = self._shot.passages[(k + 1) % len(self._shot.passages)]
                 found = max(found, n - _rank(passage.saltation(following.leg.velocities[0])))
         return min(found, n)
@@ -120,7 +123,7 @@ class Cycle:
 
         Those that sliding, contact and maps make zero are zero exactly. Without forcing one of them is 1.
         """
-        return multipliers_of(self.monodromy, self.n_zero)
+        return multipliers_of(self._shot, self.is_forced, self.n_zero)
 
     @property
     def trivial_error(self) -> float:
@@ -170,7 +173,7 @@ class Cycle:
         -------
         ndarray, shape (n,)
         """
-        itinerary, motions = self.itinerary, self._shooting.motions
+        itinerary, motions = self._parts, self._shooting.motions
         rounding = 1e-10 * self.period
         t = self.t0 + (t - self.t0 + rounding) % self.period - rounding
         since = self.t0
@@ -223,12 +226,18 @@ class Cycle:
         ------
         InputError
             If there is no such parameter.
+        ModelError
+            If the cycle is not isolated.
         """
         if name not in self.params or name in self.system.discrete:
             raise InputError(f"name: the system has no parameter {name!r}{did_you_mean(name, self.params)}")
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian
+        if np.linalg.cond(jacobian[:, :size] * scales(shooting, self._u)) > 1 / _SINGULAR:
+            raise ModelError(
+                f"name: the cycle is one of a family or at a fold, with no derivative by {name!r}"
+            )
         solved = np.linalg.solve(jacobian[:, :size], -jacobian[:, size])
         du: Array = np.asarray(solved, dtype=np.float64)
         states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]
@@ -240,7 +249,7 @@ class Cycle:
             velocity = self._shot.passages[0].leg.velocities[0]
             shift = -float(by_state @ start + by_name) / float(by_state @ velocity)
             start = start + shift * velocity
-        ended = [i for i, leg in enumerate(self.itinerary.legs) if leg.ending is not None]
+        ended = [i for i, leg in enumerate(self._parts.legs) if leg.ending is not None and not leg.is_cut]
         after: Array = np.asarray(states[[(i + 1) % m for i in ended]], dtype=np.float64)
         moved: Array = np.asarray(times[ended] - shift, dtype=np.float64)
         return CycleDerivative(start, float(np.sum(durations)), moved, after)
@@ -261,7 +270,7 @@ class Cycle:
 
     def _with_derivatives_by(self, names: Sequence[str]) -> Shooting:
         motions = self._shooting.motions.with_derivatives_by(names)
-        return Shooting(motions, self.itinerary, self._shooting.period)
+        return Shooting(motions, self._parts, self._shooting.period)
 
 
 def _rank(matrix: Array) -> int:
@@ -271,9 +280,13 @@ def _rank(matrix: Array) -> int:
     return int(np.linalg.matrix_rank(matrix, tol=1e-10 * max(float(np.max(np.abs(matrix))), 1e-300)))
 
 
-def multipliers_of(monodromy: Array, n_zero: int) -> npt.NDArray[np.complex128]:
-    """Return the eigenvalues, the largest first, of which the smallest are zero."""
-    found = np.linalg.eigvals(monodromy).astype(np.complex128)
+def multipliers_of(shot: Shot, is_forced: bool, n_zero: int = 0) -> npt.NDArray[np.complex128]:
+    """Return the multipliers, the largest first, of which the smallest are zero; without forcing one is 1."""
+    across = None if is_forced else shot.across()
+    own = shot.monodromy() if across is None else across
+    found = np.linalg.eigvals(own).astype(np.complex128)
+    if across is not None:
+        found = np.append(found, 1.0)
     found = found[np.argsort(-np.abs(found), kind="stable")]
     if n_zero:
         found[len(found) - n_zero :] = 0.0
@@ -306,7 +319,12 @@ def _slopes_of(
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
-    """Whether a run from within a cycle makes its pieces."""
+    """Whether its pieces end as they should, and a run from within a cycle makes them."""
+    if any(probe.value < -_ROUNDING for probe in end_probes_of(cycle._shooting, cycle._shot)):
+        return False
+    if len(cycle._parts.legs) > len(cycle.itinerary.legs):  # a run would leave it
+        shot = cycle._shooting.shoot(cycle._u, PLACES)
+        return all(probe.value > -_ROUNDING for probe in probes_of(cycle._shooting, cycle._u, shot))
     (t, x), period = cycle.inside(), cycle.period
     try:
         record = cycle._shooting.motions.record((t, t + 1.02 * period), x)
@@ -321,7 +339,7 @@ def follows_itinerary(cycle: Cycle) -> bool:
     end = record.solution.sol(t + period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
-    return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
+    return bool(is_same and np.max(np.abs(end - x)) < (1e-6 + 1e-9 * growth) * size)
 
 
 def _kinds(itinerary: Itinerary) -> list[object]:
@@ -471,9 +489,28 @@ def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
         If Newton's method does not converge, or the cycle holds a sample of the state.
     """
     shooting = Shooting(motions, itinerary, period)
-    u, shot, residual = solve(shooting, shooting.unknowns(itinerary))
+    u = shooting.unknowns(itinerary)
+    finer = divided(shooting, u, shooting.shoot(u))
+    if finer is not None:
+        shooting, u = finer
+    u, shot, residual = solve(shooting, u)
     _refuse_samples(shooting, shot)
     return Cycle(shooting, u, shot, residual)
+
+
+def in_parts(cycle: Cycle) -> Cycle | None:
+    """Return the same cycle with legs divided along which perturbations grow much; nothing if none is.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge.
+    """
+    finer = divided(cycle._shooting, cycle._u, cycle._shot)
+    if finer is None:
+        return None
+    u, shot, residual = solve(*finer)
+    return Cycle(finer[0], u, shot, residual, cycle._section)
 
 
 def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
@@ -508,7 +545,7 @@ def _is_forced(motions: Motions, t0: float, x: Array, period: Any) -> bool:
 def _from_itinerary(motions: Motions, given: Itinerary | Cycle, period: Any) -> Cycle:
     if isinstance(given, Cycle):
         own = given._shooting.period
-        return cycle_of(motions, given.itinerary, own if period is None else GivenPeriod(period))
+        return cycle_of(motions, given._parts, own if period is None else GivenPeriod(period))
     if not isinstance(given, Itinerary):
         raise InputError(f"itinerary: that of a cycle is needed, not {type(given).__name__}")
     forced = None if period is None else GivenPeriod(period)
@@ -575,6 +612,7 @@ def _repeated_forced(
     single = forcing.value(motions)
     if transient == 0:
         return cycle_at(motions, t0, x, single, forcing)
+    problem = ""
     for attempt in range(4):
         count = transient * 4**attempt
         phases = t0 + single * (count + (np.arange(_PHASES) + 0.381966) / _PHASES)
@@ -594,19 +632,19 @@ def _repeated_forced(
             forcing.multiple = multiple
             try:
                 found = cycle_at(motions, start, points[:, 0], multiple * single, forcing)
-                turns = _turns(found, multiple)
+                turns = turns_of(found, multiple)
                 if turns > 1:
                     forcing.multiple = multiple // turns
                     found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
                 if _attracts(found):
                     return found
-            except ModelError:
-                if attempt == 3:
-                    raise
+                problem = "; the cycle near it is unstable"
+            except ModelError as error:
+                problem = f"; near it {str(error)[0].lower()}{str(error)[1:]}"
     raise ModelError(
         f"no cycle was found: after {count} periods of the forcing the run does not repeat itself within "
-        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be "
-        "chaotic, quasiperiodic or grow; more of it is simulated with transient="
+        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size{problem}). It may "
+        "be chaotic, quasiperiodic or grow; more of it is simulated with transient="
     )
 
 
@@ -647,7 +685,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
-                    turns = _turns(found, len(found.itinerary.legs))
+                    turns = turns_of(found, len(found.itinerary.legs))
                     if turns > 1:
                         found = cycle_at(motions, *found.inside(), found.period / turns, None)
                     if _attracts(found):
@@ -670,13 +708,20 @@ def _first_event(run: Solution) -> tuple[Array, Array]:
 
 
 def _last_inside(run: Solution) -> tuple[float, Array]:
-    """Return the last place of a run in the middle of a piece that slides on no surface; or else its end."""
+    """Return the last place of a run in the middle of a piece that slides on few surfaces."""
     assert run.sol is not None
-    for segment in run.segments[::-1][:_MOST_RETURNS]:
-        if segment.mode.codimension == 0 and segment.t_end > segment.t_start:
-            t = 0.5 * (segment.t_start + segment.t_end)
-            return t, run.sol(t)
-    return float(run.t[-1]), run.y[:, -1]
+    t_end, span = float(run.t[-1]), float(run.t[-1] - run.t[0])
+    pieces = [
+        piece
+        for piece in run.segments[::-1][:_MOST_RETURNS]
+        if piece.t_end > max(piece.t_start, t_end - 0.5 * span)
+    ]
+    if not pieces:
+        return t_end, run.y[:, -1]
+    # Where none is free of sliding, a cycle may slide for ever.
+    last = min(pieces, key=lambda piece: piece.mode.codimension)
+    t = 0.5 * (max(last.t_start, t_end - 0.5 * span) + last.t_end)
+    return t, run.sol(t)
 
 
 def _attracts(cycle: Cycle) -> bool:
@@ -684,7 +729,7 @@ def _attracts(cycle: Cycle) -> bool:
     return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
 
 
-def _turns(cycle: Cycle, most: int) -> int:
+def turns_of(cycle: Cycle, most: int) -> int:
     """Return how many times a cycle goes round another one, at most so many times."""
     size = 1e-8 * np.max(np.abs(np.array(cycle.itinerary.starts)))
     t, x = cycle.t0 + 0.381966 * cycle.period / most, None

@@ -15,13 +15,21 @@ import numpy as np
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
-from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
+from filippov.cycles.cycle import Cycle, cycle_of, in_parts
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
-from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
+from filippov.cycles.passing import (
+    SHORT,
+    back_from_change,
+    beyond_change,
+    distance_from,
+    flow_near,
+    without_short_leg,
+)
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.switching import single_at_doubling
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
@@ -33,7 +41,16 @@ __all__ = ["at_value", "continuation"]
 AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
+_STEP_BEHIND = 2e-3
 _WIDTH = 1e-13
+_SAME_HALVES, _NOISE = 1e-9, 1e-10
+# A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
+_UNBOUNDED, _STANDS = 1e4, 1e-8
+# How far, by its size, a cycle is another one.
+_JUMPS = 0.2
+_NO_DURATION, _VANISHES = 1e-13, 1e-9
+# How near to 1 or -1 a multiplier is at a fold or a period doubling.
+_CRITICAL = 1e-3
 _SAVED_EVERY = 50
 # Their test functions change signs with the direction.
 _TURNING = ("LP", "PSN", "BP")
@@ -79,7 +96,7 @@ def continuation(
     ----------
     start : Cycle, Equilibrium or Special
         With one parameter a special point is where the other branch through it starts: cycles of twice the
-        period at PD, the other equilibria at BE. With two parameters it is a point of the curve.
+        period at PD, the other equilibria at BE, cycles at HB. With two parameters the curve goes through it.
     parameter : str, or pair of str
         What varies.
     bounds : (float, float), or dict
@@ -237,7 +254,7 @@ def at_value(state: State, name: str, value: float) -> State:
     if isinstance(state, Cycle):
         motions = state._shooting.motions.with_derivatives_by(())
         motions.use({**state.params, name: value})
-        return cycle_of(motions, state.itinerary, state._shooting.period)
+        return cycle_of(motions, state._parts, state._shooting.period)
     motions = state._curve.motions.with_derivatives_by(())
     motions.use({**state.params, name: value})
     curve = EquilibriumCurve(motions, state._curve.mode)
@@ -313,14 +330,15 @@ class _Side:
                 self.reason = f"{self.settings.name} = {self.here.w[-1]:g} is the end of the range"
                 self._add("EP", None, self.here.curve, self.points[-1].state)
                 return
-            n_special = len(self.special)
+            n_special, curve = len(self.special), self.here.curve
             try:
                 step, next_one = self._step(ds)
                 goes_on = self._accept(step, next_one)
             except ModelError as error:
                 del self.special[n_special:]
                 is_long = ds > (_SHORTEST_STEP if isinstance(self.here.curve, EquilibriumCurve) else 4e-3)
-                if not is_long and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
+                is_vanishing = not is_long or self._leg_vanishes_within(ds)
+                if is_vanishing and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
                     if self.is_stopped:
                         return
                     ds = min(self.settings.step, 4 * ds)
@@ -330,8 +348,11 @@ class _Side:
                     self.reason = self._why_it_ended(error)
                     return
                 continue
-            if not goes_on or self._closes() or self._vanishes():
+            if not goes_on or self._closes() or self._vanishes() or self._grows():
                 return
+            if self.here.curve is not curve:
+                ds = min(ds, _STEP_BEHIND)  # near a fold of both the branch bends much
+                continue
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
         self.reason = f"{self.settings.most} points"
 
@@ -370,8 +391,39 @@ class _Side:
             return False
         self.points.pop()
         value = self.points[-1].params[self.settings.name]
+        # Its multiplier is 1 there, and the branch comes back inside out: that is no fold.
+        self.special = [
+            s for s in self.special if s.code not in ("LP", "BP") or s.point < len(self.points) - 1
+        ]
         self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
         return True
+
+    def _grows(self) -> bool:
+        """Whether the cycle, or its period, grows without bound: the parameter comes to a limit."""
+        first, last = self.points[0].state, self.points[-1].state
+        if not isinstance(first, Cycle) or not isinstance(last, Cycle):
+            return False
+        name, value = self.settings.name, float(self.here.w[-1])
+        starts = (np.max(np.abs(np.array(cycle.itinerary.starts))) for cycle in (first, last))
+        grown = next(starts) * _UNBOUNDED < next(starts)
+        if grown and _size_of(last) > _UNBOUNDED * _size_of(first):
+            self.reason = f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
+            return True
+        if last.is_forced:
+            return False
+        values = []
+        for point in self.points[::-1]:
+            values.append(point.params[name])
+            assert isinstance(point.state, Cycle)
+            if np.ptp(values) > _STANDS * self.settings.size:
+                return False
+            if last.period > 1.3 * point.state.period:
+                self.reason = (
+                    f"the period grows without bound near {name} = {value:.9g}, to {last.period:.3g}: the "
+                    "cycle comes to an orbit that begins and ends at an equilibrium"
+                )
+                return True
+        return False
 
     def _is_at_end(self) -> bool:
         """Whether the range ends here, and the branch does not lead into it."""
@@ -399,10 +451,17 @@ class _Side:
 
     def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
+        if self._is_single_again(following):
+            return False
         before, after = self.here.tests, following.tests
         wanted = {*CHANGES, *self.settings.detect}
         common = [key for key in after if key in before and key[0] in wanted]
-        changed = [key for key in common if after[key] * before[key] < 0]
+        # What vanishes along a whole branch has no sign.
+        changed = [
+            key
+            for key in common
+            if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > _NOISE
+        ]
         found = sorted((self._located(self.here, key, following) for key in changed), key=lambda at: at[0])
         curve = self.here.curve
         for _, key, located in found:
@@ -419,7 +478,44 @@ class _Side:
                 self._add(key[0], key, curve, state)
         state = curve.state(step.w, step.error)
         curve.refer_to(step.w)
+        finer = in_parts(state) if isinstance(state, Cycle) else None
+        if finer is not None:
+            following, state = self._finer(following, finer), finer
         self._go_on(following, state)
+        return True
+
+    def _finer(self, position: _Position, cycle: Cycle) -> _Position:
+        """Return the position of a cycle in more parts, with the direction of one in fewer."""
+        finer = self._position(cycle, 1.0)
+        ways = [_summary(place.curve, place.w, place.tangent) for place in (position, finer)]
+        return finer if ways[0] @ ways[1] > 0 else finer.turned()
+
+    def _is_single_again(self, following: _Position) -> bool:
+        """Whether a cycle of two alike halves has become one that is followed twice: behind it they swap."""
+        curve = self.here.curve
+        if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
+            return False
+        halves = [_difference_of_halves(curve, place.w) for place in (self.here, following)]
+        before, after = halves
+        if before is None or after is None:
+            return False
+        size = np.linalg.norm(before)
+        if size < _SAME_HALVES or (before @ after > 0 and np.linalg.norm(after) > _SAME_HALVES):
+            return False
+        self.reason = "the cycle comes back to one of half the period, followed twice"
+        try:
+            there = single_at_doubling(curve, self.here.w, following.w)
+        except ModelError:
+            return True
+        name, near = self.settings.name, 1e-6 * self.settings.size
+        # The fold of the doubled branch in its own middle is this point.
+        self.special = [
+            special
+            for special in self.special
+            if special.code not in ("LP", "BP") or abs(special.params[name] - there.params[name]) > near
+        ]
+        self._add("PD", ("PD",), curve, there)
+        self.reason += f", at {CODES['PD']} {name} = {there.params[name]:.12g}"
         return True
 
     def _located(self, start: _Position, key: Any, end: _Position) -> tuple[float, Any, Step]:
@@ -444,7 +540,8 @@ class _Side:
             zero_between(value, (0.0, tests[key]), (length, end.tests[key]), _WIDTH)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
-            if key[0] in CHANGES or not nearest:
+            is_near = nearest and nearest[0][0] < 1e-6 * max(abs(tests[key]), abs(end.tests[key]))
+            if not nearest or (key[0] in CHANGES and not is_near):
                 raise
         _, s, point = nearest[0]
         return s, key, point
@@ -479,20 +576,23 @@ class _Side:
             here = curve.state(located.w, located.error)
             following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
         else:
-            for reach in (1.0, 3.0, 0.3):
-                w = located.w + reach * (beyond - located.w)
-                new = _flow_near(curve, w)
-                if new is not None and not new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
-                    following = new, direction
-                    break
-            if following is None and key[3] == "end":
-                following = _without_leg(curve, key[1], located, self.settings)
+            new = beyond_change(curve, located, beyond)
+            following = back_from_change(curve, key, located) if new is None else (new, direction)
         if following is None:
             what = "equilibrium" if isinstance(curve, EquilibriumCurve) else "cycle of the flow"
             self.reason = f"behind {self.special[-1]!r} no {what} was found"
             return False
         self._go_on(self._position(*following), following[0])
         return True
+
+    def _leg_vanishes_within(self, ds: float) -> bool:
+        """Whether a leg that is short already would have no duration after a step."""
+        curve, w, tangent, _ = self.here
+        if not isinstance(curve, CycleCurve):
+            return False
+        own = slice(curve.shooting.m * curve.shooting.n, curve.shooting.m * (curve.shooting.n + 1))
+        now, then = (v[own] for v in (w, w + ds * tangent * curve.scales(w)))
+        return bool(np.any((then <= 0) & (now < SHORT * np.sum(now))))
 
     def _goes_beyond_a_vanishing_leg(self, ds: float) -> bool:
         """Go on behind the point at which a leg vanishes, if there is one."""
@@ -501,21 +601,84 @@ class _Side:
             return False
         scale = curve.scales(w)
         direction = float(np.sign(tangent[-1])) or self.direction
+        value = float(w[-1])
         for reach in (1.0, 2.0, 4.0):
-            new = _flow_near(curve, w + reach * ds * tangent * scale)
+            new = flow_near(curve, w + reach * ds * tangent * scale)
             if new is None or new.itinerary.is_same(curve.shooting.itinerary(w[:-1])):
                 continue
+            jumps = distance_from(curve, w, new) > _JUMPS
+            if self._turns_to(new, -direction, value, jumps):
+                return True
+            if not jumps and self._passes_to(new, direction, ds):
+                return True
+        # At a non-smooth fold the cycle without the leg is on this side, and ends at the same point.
+        shorter = without_short_leg(curve, w)
+        return shorter is not None and any(
+            self._turns_to(shorter, direction, value + reach * direction * ds * scale[-1])
+            for reach in (0.1, 1.0, 4.0)
+        )
+
+    def _passes_to(self, new: Cycle, direction: float, ds: float) -> bool:
+        """Go on with a cycle behind the point at which a leg of this one has no duration, as at a corner."""
+        curve, w, tangent, _ = self.here
+        assert isinstance(curve, CycleCurve)
+        scale, first, m = curve.scales(w), curve.shooting.m * curve.shooting.n, curve.shooting.m
+        period = float(np.sum(w[first : first + m]))
+        ahead = (w + 4.0 * ds * tangent * scale)[first : first + m]
+        for k in np.flatnonzero(ahead <= 0):
+            there = w + w[first + k] / (w[first + k] - ahead[k]) * 4.0 * ds * tangent * scale
+            there[first + k] = _NO_DURATION * period
+            unit = np.zeros(len(w))
+            unit[first + k] = 1.0
             try:
-                back = self._position(new, -direction)
-                self._locate_behind(back, float(w[-1]))
+                step = corrected(curve, there, scale, unit)
+                following = self._position(new, direction)
+                values = {p.key: p.value for p in curve.probes(step.w)}
             except ModelError:
                 continue
+            key = min(values, key=lambda key: abs(values[key]), default=None)
+            is_between = (step.w[-1] - w[-1]) * (following.w[-1] - step.w[-1]) >= 0
+            if key is None or abs(values[key]) > _VANISHES or not is_between:
+                continue
+            self._add(key[0], key, curve, curve.state(step.w, step.error))
             if self.settings.switch == "follow":
-                self._go_on(back.turned(), new)
+                self._go_on(following, new)
             else:
                 self.reason, self.is_stopped = f"{self.special[-1]!r}", True
             return True
         return False
+
+    def _turns_to(self, new: Cycle, direction: float, value: float, jumps: bool = False) -> bool:
+        """Go on with a cycle, away from the point that it comes to on the way to a value of the parameter.
+
+        Parameters
+        ----------
+        new : Cycle
+        direction : float
+            In which direction the parameter leads to the point.
+        value : float
+            A value behind it.
+        jumps : bool, optional
+            The cycle is another one, and the branch ends at the point.
+
+        Returns
+        -------
+        bool
+            False: no test function vanishes on the way.
+        """
+        try:
+            back = self._position(new, direction)
+            self._locate_behind(back, value)
+        except ModelError:
+            return False
+        if jumps:
+            self.reason = f"behind {self.special[-1]!r} the flow jumps to another cycle"
+            self.is_stopped = True
+        elif self.settings.switch == "follow":
+            self._go_on(back.turned(), new)
+        else:
+            self.reason, self.is_stopped = f"{self.special[-1]!r}", True
+        return True
 
     def _locate_behind(self, start: _Position, value: float) -> None:
         """Go back to a value of the parameter, and find the test function that vanishes first on the way.
@@ -541,15 +704,33 @@ class _Side:
 
     def _why_it_ended(self, error: ModelError) -> str:
         name, value = self.settings.name, float(self.here.w[-1])
-        first, last = self.points[0].state, self.points[-1].state
-        grows = ""
-        if isinstance(last, Cycle) and isinstance(first, Cycle):
-            sizes = [float(np.max(np.abs(np.array(c.itinerary.starts)))) for c in (first, last)]
-            if sizes[1] > 1e3 * sizes[0]:
-                grows = f"; the cycle grows without bound, to {sizes[1]:.3g}"
-            elif last.period > 1e3 * first.period:
-                grows = f"; the period grows without bound, to {last.period:.3g}"
-        return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
+        return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
+
+
+def _summary(curve: AnyCurve, w: Array, tangent: Array) -> Array:
+    """Return what a direction does to the first state, the period and the parameter of a cycle."""
+    assert isinstance(curve, CycleCurve)
+    n, m = curve.shooting.n, curve.shooting.m
+    return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])
+
+
+def _size_of(cycle: Cycle) -> float:
+    starts = float(np.max(np.abs(np.array(cycle.itinerary.starts))))
+    return max(starts, float(np.max(cycle._shooting.swing)))
+
+
+def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
+    """Return by how much the halves of a cycle differ, by its size; nothing if they are not alike."""
+    shooting = curve.shooting
+    n, m = shooting.n, shooting.m
+    itinerary = shooting.itinerary(w[: curve.n_unknowns])
+    if m % 2 or not itinerary.is_closed_by_event():
+        return None
+    first, second = itinerary.legs[: m // 2], itinerary.legs[m // 2 :]
+    if not all(a.is_alike(b) for a, b in zip(first, second, strict=True)):
+        return None
+    states = (w / curve.scales(w))[: m * n].reshape(2, -1)
+    return np.asarray(states[0] - states[1])
 
 
 def _is_same(one: State, other: State) -> bool:
@@ -575,77 +756,22 @@ def _at_parameter(curve: AnyCurve, w: Array, value: float, scale: Array) -> Step
 
 
 def _is_real(key: Any, state: State) -> bool:
-    """Whether a zero of a test function is what its code says: a critical pair is complex."""
-    if key[0] == "HB":
+    """Whether a zero of a test function is what its code says, and not a pole of it or noise."""
+    code = key[0]
+    if code == "HB":
         assert isinstance(state, Equilibrium)
         values = state.eigenvalues
         critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
         return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
-    if key[0] == "NS":
-        assert isinstance(state, Cycle)
-        values = state.nontrivial
+    if not isinstance(state, Cycle):
+        return True
+    values = state.nontrivial
+    if code == "NS":
         return bool(abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) > 1e-6)
+    if code in ("LP", "PD") and np.all(np.isfinite(values)):
+        critical = -1.0 if code == "PD" else 1.0
+        return bool(np.min(np.abs(values - critical), initial=np.inf) < _CRITICAL)
     return True
-
-
-def _flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
-    """Return the cycle of the flow near a point that need not be one, with the pieces of a run."""
-    shooting = curve.shooting
-    motions = shooting.motions.with_derivatives_by(())
-    motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
-    starts, durations, t = shooting.parts(w[: curve.n_unknowns])
-    longest = int(np.argmax(durations))
-    leg = shooting.legs[longest]
-    t += sum(durations[:longest])
-    half = 0.5 * durations[longest]
-    try:
-        x = motions.leg(leg.mode, leg.discrete, t, starts[longest], half).x
-        forcing = shooting.period
-        duration = sum(durations) if forcing is None else forcing.value(motions)
-        found = cycle_at(motions, t + half, x, duration, forcing)
-    except ModelError:
-        return None
-    is_near = abs(found.period - duration) < 0.3 * duration
-    return found if is_near and found.is_admissible else None
-
-
-def _without_leg(
-    curve: CycleCurve, end: int, located: Step, settings: _Settings
-) -> tuple[Cycle, float] | None:
-    """Return the cycle near a point that does not do what happens at the end of a leg, and where it leads to.
-
-    Two branches may meet at a point and both lie on one side of it, like those with and without an impact.
-    """
-    shooting = curve.shooting
-    itinerary = shooting.itinerary(located.w[: curve.n_unknowns])
-    following = (end + 1) % len(itinerary.legs)
-    if len(itinerary.legs) == 1:
-        legs, starts, durations = (
-            [itinerary.legs[0]._replace(ending=None)],
-            itinerary.starts,
-            itinerary.durations,
-        )
-    elif itinerary.legs[end].mode == itinerary.legs[following].mode and following > end:
-        kept = [k for k in range(len(itinerary.legs)) if k != end]
-        legs = [itinerary.legs[k] for k in kept]
-        starts = tuple(itinerary.starts[end if k == following else k] for k in kept)
-        both = itinerary.durations[end] + itinerary.durations[following]
-        durations = tuple(both if k == following else itinerary.durations[k] for k in kept)
-    else:
-        return None
-    shorter = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
-    motions = shooting.motions.with_derivatives_by(())
-    for direction in (1.0, -1.0):
-        value = located.w[-1] + direction * 1e-4 * settings.size
-        motions = motions.with_derivatives_by(())
-        motions.use({**motions.params, settings.name: value})
-        try:
-            cycle = cycle_of(motions, shorter, shooting.period)
-        except ModelError:
-            continue
-        if cycle.is_admissible:
-            return cycle, direction
-    return None
 
 
 def _other_branch(special: Special, name: str) -> State:

@@ -69,6 +69,10 @@ class GivenPeriod:
         """Return it for cycles of twice the period."""
         return GivenPeriod(self.phase.period, 2 * self.multiple)
 
+    def half(self) -> GivenPeriod:
+        """Return it for cycles of half the period."""
+        return GivenPeriod(self.phase.period, self.multiple // 2)
+
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
         try:
@@ -112,6 +116,10 @@ class InferredPeriod:
     def twice(self) -> InferredPeriod:
         """Return it for cycles of twice the period."""
         return InferredPeriod(self.guess, 2 * self.multiple, self.exponents)
+
+    def half(self) -> InferredPeriod:
+        """Return it for cycles of half the period."""
+        return InferredPeriod(self.guess, self.multiple // 2, self.exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""

@@ -24,15 +24,18 @@ class Ending(NamedTuple):
         The time, if it is known.
     acts : tuple of int
         The actions that are done.
+    cuts : bool
+        Nothing happens: the motion goes on, and is only divided.
     """
 
     guard: Guard | None
     time: float
     acts: tuple[int, ...] = ()
+    cuts: bool = False
 
     def is_same(self, other: Ending | None) -> bool:
         """Whether another ending is of this kind."""
-        return other is not None and self.guard == other.guard and self.acts == other.acts
+        return other is not None and self._replace(time=0.0) == other._replace(time=0.0)
 
 
 class Leg(NamedTuple):
@@ -51,6 +54,15 @@ class Leg(NamedTuple):
     mode: Mode
     discrete: tuple[float, ...]
     ending: Ending | None
+
+    def is_alike(self, other: Leg) -> bool:
+        """Whether another leg has this mode and this ending."""
+        return _signature(self) == _signature(other)
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the next leg is its continuation."""
+        return self.ending is not None and self.ending.cuts
 
 
 class Itinerary(NamedTuple):
@@ -95,18 +107,34 @@ class Itinerary(NamedTuple):
         """Whether the last leg ends at an event."""
         return self.legs[-1].ending is not None
 
+    def merged(self) -> Itinerary:
+        """Return the same cycle with all that is divided in one leg."""
+        legs: list[Leg] = []
+        starts: list[Array] = []
+        durations: list[float] = []
+        goes_on = False
+        for leg, start, duration in zip(self.legs, self.starts, self.durations, strict=True):
+            if goes_on:
+                legs[-1], durations[-1] = leg, durations[-1] + duration
+            else:
+                legs.append(leg)
+                starts.append(start)
+                durations.append(duration)
+            goes_on = leg.is_cut
+        return Itinerary(tuple(legs), self.t0, tuple(starts), tuple(durations))
+
     def is_same(self, other: Itinerary) -> bool:
         """Whether two cycles have the same modes and endings, up to where they start."""
-        if len(self.legs) != len(other.legs):
+        own = [_signature(leg) for leg in self.merged().legs]
+        theirs = [_signature(leg) for leg in other.merged().legs]
+        if len(own) != len(theirs):
             return False
-        own = [_signature(leg) for leg in self.legs]
-        theirs = [_signature(leg) for leg in other.legs]
         return any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
 
 
 def _signature(leg: Leg) -> tuple[object, ...]:
     ending = leg.ending
-    return (leg.mode, None if ending is None else (ending.guard, ending.acts))
+    return (leg.mode, None if ending is None else (ending.guard, ending.acts, ending.cuts))
 
 
 def itinerary_of(record: Record, t0: float, t1: float) -> Itinerary:

@@ -114,8 +114,10 @@ def monitors_of(given: Mapping[str, Any] | None, state: State) -> tuple[Monitor,
             raise InputError(f"monitor: {name!r} is the name of another quantity of the branch")
         monitor = Monitor(name, function)
         try:
-            monitor.value(state)
+            first = monitor.value(state)
         except Exception as error:  # whatever a user's function raises
             raise InputError(f"monitor: {name!r} cannot be evaluated: {error}") from error
+        if not np.isfinite(first):
+            raise InputError(f"monitor: {name!r} is {first} at the start")
         found.append(monitor)
     return tuple(found)

@@ -16,16 +16,11 @@ from filippov.cycles.motions import Array, Guard, Mode, Motions
 from filippov.cycles.shooting import Passage, Shooting, Shot
 from filippov.cycles.zero import zero_between
 
-__all__ = ["PLACES", "Probe", "local_probe", "probes_of"]
+__all__ = ["PLACES", "Probe", "end_probes_of", "local_probe", "probes_of"]
 
 PLACES = 6
-_NAMES = {
-    "CS": "crossing-sliding",
-    "SS": "switching-sliding",
-    "GS": "grazing-sliding",
-    "AS": "adding-sliding",
-    "GR": "grazing",
-}
+# Numbers of test functions at the end of a leg.
+_CORNER, _TWO_FOLD = 3, 4
 
 
 class Probe(NamedTuple):
@@ -77,13 +72,21 @@ def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
     starts, _, t = shooting.parts(u)
     for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
         along = passage.leg.times, passage.leg.guards
-        if leg.ending is None:
-            # The first leg goes on with it.
-            times, guards = shot.passages[0].leg.times, shot.passages[0].leg.guards
+        if leg.ending is None or leg.is_cut:
+            # The next leg goes on with it.
+            beside = shot.passages[(i + 1) % shooting.m].leg
+            times, guards = beside.times, beside.guards
             beyond = passage.t + times[1] - times[0]
             along = np.append(along[0], beyond), np.hstack([along[1], guards[:, 1:2]])
         found += _inside(shooting, i, leg, t, starts[i], along)
         t = passage.t
+    return found + end_probes_of(shooting, shot)
+
+
+def end_probes_of(shooting: Shooting, shot: Shot) -> list[Probe]:
+    """Return the test functions at the ends of the legs."""
+    found: list[Probe] = []
+    for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
         following = shooting.legs[(i + 1) % shooting.m]
         if leg.ending is not None and leg.ending.guard is not None:
             found += _at_end(shooting.motions, i, leg, following, passage)
@@ -162,7 +165,21 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
 
     # The motion leads through the zero of its guard.
     code = "GR" if leg.ending.acts else {"surface": "GS", "multiplier": "AS"}.get(kind, "AS")
-    add(code, guard, -own.rates()[place])
+    rate = -float(own.rates()[place])
+    # Nothing else ends it at the same place.
+    for k, other in enumerate(motions.guards(leg.mode, leg.discrete)):
+        if other[0] in ("surface", "multiplier") and other[:2] != guard[:2]:
+            add("CO", other, own.values[k], _CORNER)
+    if kind == "multiplier" and not leg.ending.acts and following.mode[surface] != 0:
+        # The field of the other side leads to the surface: else both are tangent where sliding ends.
+        side = (*following.mode[:surface], -following.mode[surface], *following.mode[surface + 1 :])
+        beside = motions.at(side, passage.discrete, t, passage.after)
+        for k, other in enumerate(motions.guards(side, passage.discrete)):
+            if other[:2] == ("surface", surface):
+                towards = -float(beside.rates()[k])
+                add("TF", guard, towards, _TWO_FOLD)
+                rate *= towards  # the rate of the multiplier has a pole there
+    add(code, guard, rate)
     if leg.ending.acts or kind != "surface":
         return found
     behind = motions.at(following.mode, passage.discrete, t, passage.after)
@@ -209,6 +226,11 @@ def local_probe(
     passage = shooting._pass(leg, t0, x, duration, 0)
     behind = shooting.legs[(i + 1) % shooting.m]._replace(discrete=passage.discrete)
     value = {probe.key: probe.value for probe in _at_end(motions, i, leg, behind, passage)}[key]
+    if number == _TWO_FOLD:
+        return value, np.nan, 1.0
+    if number == _CORNER:
+        g = motions.guards(leg.mode, leg.discrete).index(guard)
+        return value, float(motions.at(leg.mode, leg.discrete, passage.t, passage.leg.x).rates()[g]), 1.0
     if number == 0:  # the motion before leads through the zero of its guard
         g = motions.guards(leg.mode, leg.discrete).index(guard)
         return value, _second(motions, leg, passage.t, passage.leg.x, g, duration), 1.0

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from filippov.cycles.branch import Branch, Point, Special, State
+from filippov.cycles.curves import OnCurve
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
@@ -46,6 +47,10 @@ def save_branch(branch: Branch, path: str | os.PathLike[str]) -> None:
         "points": [_point(point) for point in branch.points],
         "special": [_special(special) for special in branch.special],
     }
+    if isinstance(branch._at_value, OnCurve):
+        start = branch._at_value.start
+        start = start._replace(params={name: start.state.params[name] for name in branch.names})
+        data["curve of"] = {"start": _special(start), "sizes": branch._at_value.sizes}
     target = Path(path)
     beside = target.with_name(target.name + ".part")
     beside.write_text(json.dumps(data))
@@ -96,20 +101,25 @@ def load_branch(
         Point(row["params"], build.state(row), {tuple(_tupled(key)): value for key, value in row["tests"]})
         for row in data["points"]
     ]
-    special = [
-        Special(
-            row["code"],
-            row["kind"],
-            row["surface"],
-            np.nan if row["t"] is None else row["t"],
-            row["params"],
-            row["point"],
-            build.state(row),
-            None if row["test"] is None else tuple(_tupled(row["test"])),
-        )
-        for row in data["special"]
-    ]
-    return Branch(points, special, data["reasons"], data["names"], data["monitors"], at_value)
+    special = [_read_special(row, build) for row in data["special"]]
+    on_branch: Callable[[State, str, float], State] = at_value
+    if "curve of" in data:
+        start = _read_special(data["curve of"]["start"], build)
+        on_branch = OnCurve(start, tuple(data["names"]), tuple(data["curve of"]["sizes"]))
+    return Branch(points, special, data["reasons"], data["names"], data["monitors"], on_branch)
+
+
+def _read_special(row: Mapping[str, Any], build: _Builder) -> Special:
+    return Special(
+        row["code"],
+        row["kind"],
+        row["surface"],
+        np.nan if row["t"] is None else row["t"],
+        row["params"],
+        row["point"],
+        build.state(row),
+        None if row["test"] is None else tuple(_tupled(row["test"])),
+    )
 
 
 def _tupled(value: Any) -> Any:
@@ -138,7 +148,7 @@ def _special(special: Special) -> dict[str, Any]:
 def _state(state: State) -> dict[str, Any]:
     if isinstance(state, Equilibrium):
         return {"w": state._w[: state._curve.n_unknowns].tolist(), "mode": list(state._curve.mode)}
-    itinerary, period = state.itinerary, state._shooting.period
+    itinerary, period = state._parts, state._shooting.period
     legs = [
         [list(leg.mode), list(leg.discrete), None if leg.ending is None else list(leg.ending)]
         for leg in itinerary.legs
@@ -173,8 +183,8 @@ class _Builder:
         for mode, discrete, ending in row["legs"]:
             end = None
             if ending is not None:
-                guard, time, acts = ending
-                end = Ending(None if guard is None else tuple(guard), time, tuple(acts))
+                guard, time, acts, *cuts = ending
+                end = Ending(None if guard is None else tuple(guard), time, tuple(acts), *cuts)
             legs.append(Leg(tuple(mode), tuple(discrete), end))
         starts = tuple(np.array(start) for start in row["starts"])
         itinerary = Itinerary(tuple(legs), row["t0"], starts, tuple(row["durations"]))

@@ -10,6 +10,7 @@ Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +20,20 @@ from filippov.cycles.itinerary import Ending, Itinerary, Leg
 from filippov.cycles.motions import Array, LegEnd, Motions
 from filippov.errors import ModelError
 
-__all__ = ["Passage", "Period", "Shooting", "Shot", "scales", "solve"]
+__all__ = ["Passage", "Period", "Shooting", "Shot", "divided", "scales", "solve"]
 
 Period = GivenPeriod | InferredPeriod | None
 _MOST_STEPS = 30
+# Legs along which perturbations grow by more are divided into parts along which they grow less.
+_GROWTH, _GROWTH_OF_PARTS = 1e3, 30.0
+# A step of so many sizes of a cycle is one of equations that are singular but for rounding; so is a much
+# shorter one where the equations hold to rounding.
+_ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
+_SOLVED = 1e-11
+# A leg that vanishes may last for less than nothing by rounding.
+_NOTHING = 1e-11
+# A cycle whose velocities fall to such a share is an equilibrium.
+_SHRUNK = 1e-6
 
 
 class Passage(NamedTuple):
@@ -106,6 +117,24 @@ class Shot(NamedTuple):
             states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
         return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
 
+    def across(self) -> Array | None:
+        """Return the monodromy matrix across the motion, (n - 1, n - 1); nothing where the motion rests.
+
+        The direction of the motion is mapped to itself. Without it the product keeps the digits of the other
+        multipliers, however large they are beside 1.
+        """
+        starts = [passage.leg.velocities[0] for passage in self.passages]
+        if not all(np.isfinite(f).all() and np.any(f) for f in starts):
+            return None
+        normals = [np.linalg.svd(f[None, :])[2][1:].T for f in starts]
+        found = np.eye(len(starts[0]) - 1)
+        for i, passage in enumerate(self.passages):
+            k = (i + 1) % len(starts)
+            step = passage.saltation(starts[k]) @ passage.leg.by_state
+            with np.errstate(invalid="ignore", over="ignore"):
+                found = normals[k].T @ step @ normals[i] @ found
+        return found if np.isfinite(found).all() else None
+
 
 class Shooting:
     """The equations of an itinerary.
@@ -129,6 +158,22 @@ class Shooting:
         self._reference = itinerary.starts[0].copy()
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+        self._guess = itinerary
+        # The parts of a divided motion keep their shares of it.
+        durations = itinerary.durations
+        self._shares = [
+            durations[i] / durations[i + 1] if leg.is_cut else np.nan for i, leg in enumerate(self.legs)
+        ]
+
+    @cached_property
+    def swing(self) -> Array:
+        """How far the states are from the starts of their legs on the way, (n,), in the first guess."""
+        t, found = self._guess.t0, np.zeros(self.n)
+        for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
+            middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration).x
+            found = np.maximum(found, np.abs(middle - x))
+            t += duration
+        return np.where(np.isfinite(found), found, 0.0)
 
     def refer_to(self, u: Array) -> None:
         """Fix the phase of a cycle that starts at no event beside another one."""
@@ -185,7 +230,7 @@ class Shooting:
         passages, states, times = [], [], []
         row = m * n
         for i, leg in enumerate(self.legs):
-            if durations[i] <= 0:
+            if durations[i] < -_NOTHING * sum(durations):
                 raise ModelError(f"the duration of piece {i} of the itinerary is {durations[i]:.3g}")
             passage = self._pass(leg, t, starts[i], durations[i], places)
             found = passage.leg
@@ -196,7 +241,11 @@ class Shooting:
             state[:, m * n + i] += found.velocities[1]
             time[m * n + i] = 1.0
             t = passage.t
-            if passage.row is not None:
+            if leg.is_cut:
+                residual[row] = durations[i] - self._shares[i] * durations[i + 1]
+                jacobian[row, m * n + i], jacobian[row, m * n + i + 1] = 1.0, -self._shares[i]
+                row += 1
+            elif passage.row is not None:
                 residual[row] = passage.value
                 jacobian[row] = passage.row[0] * time + passage.row[1 : 1 + n] @ state
                 jacobian[row, size:] += passage.row[1 + n :]
@@ -239,6 +288,8 @@ class Shooting:
     def _end(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
         """Return the equation of the end of a leg, and its derivatives by time, state and parameters."""
         n, k = self.n, len(self.motions.by)
+        if ending.cuts:
+            return 0.0, np.eye(1, 1 + n + k)[0]
         if ending.guard is not None:
             place = self.motions.guards(leg.mode, leg.discrete).index(ending.guard)
             at = self.motions.at(leg.mode, leg.discrete, t, x)
@@ -255,10 +306,40 @@ class Shooting:
         return t - ending.time, row
 
 
+def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] | None:
+    """Return the equations with those legs divided along which perturbations grow much; nothing if none is.
+
+    In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
+    """
+    itinerary, motions = shooting.itinerary(u), shooting.motions
+    growths = [float(np.linalg.norm(passage.leg.by_state, 2)) for passage in shot.passages]
+    if not np.isfinite(growths).all() or max(growths) < _GROWTH:
+        return None
+    legs: list[Leg] = []
+    starts: list[Array] = []
+    durations: list[float] = []
+    t = itinerary.t0
+    for leg, x, duration, growth in zip(
+        itinerary.legs, itinerary.starts, itinerary.durations, growths, strict=True
+    ):
+        count = 1 if growth < _GROWTH else int(np.ceil(np.log(growth) / np.log(_GROWTH_OF_PARTS)))
+        part = duration / count
+        for k in range(count):
+            starts.append(motions.leg(leg.mode, leg.discrete, t, x, k * part).x if k else x)
+            end = Ending(None, t + (k + 1) * part, (), cuts=True)
+            legs.append(leg if k + 1 == count else leg._replace(ending=end))
+            durations.append(part)
+        t += duration
+    parts = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
+    finer = Shooting(motions, parts, shooting.period)
+    return finer, finer.unknowns(parts)
+
+
 def scales(shooting: Shooting, u: Array) -> Array:
     """Return the sizes by which the unknowns are measured."""
     starts, durations, _ = shooting.parts(u)
-    size = np.max(np.abs(starts), axis=0)
+    # A state that is small where the legs start is not small in between.
+    size = np.maximum(np.max(np.abs(starts), axis=0), shooting.swing)
     size = np.maximum(size, 1e-3 * max(float(np.max(size)), 1e-300))
     period = float(sum(durations))
     parts = [np.tile(size, shooting.m), np.full(shooting.m, period)]
@@ -280,32 +361,57 @@ def solve(
     u = u.copy()
     best = np.inf
     first = sum(shooting.parts(u)[1])
+    at_first = 0.0
     for step in range(most):
         shot = shooting.shoot(u)
-        change = _newton_step(shot.jacobian[:, : shooting.size], shot.residual)
-        size = float(np.max(np.abs(change) / scales(shooting, u)))
+        at_first = at_first or _fastest(shot)
+        jacobian, scale = shot.jacobian[:, : shooting.size], scales(shooting, u)
+        change, is_singular = _newton_step(jacobian, shot.residual, scale)
+        size = float(np.max(np.abs(change) / scale))
         if not np.isfinite(size):
             break
         # Far from the cycle a step is no longer than the cycle.
         u = u + min(_shorter(shooting, u, change), 1.0 / max(size, 1e-300)) * change
         if not 0.02 * first < sum(shooting.parts(u)[1]) < 50 * first:
             break
-        if size < tol or (size < 1e-9 and size >= 0.5 * best):
-            return u, shooting.shoot(u), size
+        # Steps that do not become shorter are rounding, of equations that are nearly singular the more.
+        is_solved = np.all(np.abs(shot.residual) < _SOLVED * (np.abs(jacobian) @ scale))
+        if size < tol or (size >= 0.5 * best and (size < 1e-9 or (is_solved and size < 1e-7))):
+            if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
+                break
+            found = shooting.shoot(u)
+            if _fastest(found) < _SHRUNK * at_first:
+                raise ModelError("Newton's method leads to an equilibrium, and to no cycle")
+            return u, found, size
         best = min(best, size)
         if step > 8 and size > 10.0:
             break
     raise ModelError(
-        f"Newton's method does not converge to a cycle with this itinerary: the last step was {size:.2g} of "
-        "the size of the cycle"
+        f"Newton's method does not converge to a cycle with this itinerary: its steps do not become shorter "
+        f"than {best:.2g} of the size of the cycle"
     )
 
 
-def _newton_step(jacobian: Array, residual: Array) -> Array:
+def _fastest(shot: Shot) -> float:
+    """Return the largest velocity at the ends of the legs."""
+    velocities = [passage.leg.velocities for passage in shot.passages]
+    return max(float(np.max(np.abs(v))) for pair in velocities for v in pair)
+
+
+def _newton_step(jacobian: Array, residual: Array, scale: Array) -> tuple[Array, bool]:
+    """Return the step, and whether the equations are singular: then it is the shortest one.
+
+    They are so for one of a family of cycles, of a system with a constant of motion.
+    """
     try:
-        return np.asarray(-np.linalg.solve(jacobian, residual))
+        step = np.asarray(-np.linalg.solve(jacobian, residual))
+        size = np.max(np.abs(step) / scale)
+        is_solved = np.all(np.abs(residual) < _ROUNDING * (np.abs(jacobian) @ scale))
+        if size < (_LONG_BY_ROUNDING if is_solved else _ABSURD):
+            return step, False
     except np.linalg.LinAlgError:
-        return np.asarray(-np.linalg.lstsq(jacobian, residual, rcond=None)[0])
+        pass
+    return np.asarray(-np.linalg.lstsq(jacobian * scale, residual, rcond=_SINGULAR)[0] * scale), True
 
 
 def _shorter(shooting: Shooting, u: Array, change: Array) -> float:

@@ -12,15 +12,15 @@ import numpy as np
 from filippov.cycles.arclength import corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import Special, State
-from filippov.cycles.cycle import Cycle
+from filippov.cycles.cycle import Cycle, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.itinerary import itinerary_from_event
+from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event
 from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium
 from filippov.cycles.shooting import Shooting
 from filippov.errors import InputError, ModelError
 
-__all__ = ["other_branch"]
+__all__ = ["other_branch", "single_at_doubling"]
 
 
 def other_branch(special: Special, name: str) -> State:
@@ -36,16 +36,54 @@ def other_branch(special: Special, name: str) -> State:
     state = special.state
     if special.code == "BE" and isinstance(state, Equilibrium):
         return _behind_boundary(special, state, name)
+    if special.code == "HB" and isinstance(state, Equilibrium):
+        return _cycle_at_hopf(state, name)
     if special.code not in ("PD", "BP"):
         raise InputError(
-            f"start: other branches begin at PD, BP and BE, not at {special.code}; a curve in two parameters "
-            "is followed with two names, and a state with branch.at(...)"
+            f"start: other branches begin at PD, BP, BE and HB, not at {special.code}; a curve in two "
+            "parameters is followed with two names, and a state with branch.at(...)"
         )
     if not isinstance(state, Cycle):
-        raise InputError("start: other branches of equilibria begin at BE")
+        raise InputError("start: other branches of equilibria begin at BE and HB")
     size = abs(state.params[name]) or 1.0
     cycle = _doubled(state) if special.code == "PD" else state.from_event()
     return _beside(CycleCurve(cycle, (name,), (size,)), special.code)
+
+
+def _cycle_at_hopf(state: Equilibrium, name: str) -> Cycle:
+    """Return a small cycle around an equilibrium with a critical pair of eigenvalues, on its surfaces."""
+    own = state._curve
+    values, vectors = np.linalg.eig(own.linearisation(state._w))
+    k = int(np.argmin(np.abs(values.real) + 1e3 * np.abs(values.real).max() * (values.imag <= 0)))
+    frequency = float(values[k].imag)
+    if frequency <= 0:
+        raise ModelError("the equilibrium has no pair of complex eigenvalues")
+    along = (own.tangents(state._w) @ vectors[:, k]).real
+    along = along / np.linalg.norm(along)
+    motions = own.motions.with_derivatives_by(())
+    motions.use(state.params)
+    discrete = motions.record((0.0, 1e-9), state.y).discrete
+    size = float(np.max(np.abs(state.y))) or 1.0
+    bordered = (name,), (abs(state.params[name]) or 1.0,)
+    for share in (1e-2, 1e-3, 1e-1, 1e-4):
+        start = state.y + share * size * along
+        leg = Leg(own.mode, discrete, None)
+        itinerary = Itinerary((leg,), 0.0, (start,), (2 * np.pi / frequency,))
+        shooting = Shooting(motions.copy(), itinerary, None)
+        u = shooting.unknowns(itinerary)
+        try:
+            curve = CycleCurve(Cycle(shooting, u, shooting.shoot(u), 0.0), *bordered)
+            scale = curve.scales(curve.start)
+            # The amplitude is kept, and the parameter follows from it.
+            across = np.zeros(len(curve.start))
+            across[: len(along)] = along
+            step = corrected(curve, curve.start, scale, across / np.linalg.norm(across))
+            found = curve.state(step.w, step.error)
+        except ModelError:
+            continue
+        if found.is_admissible:
+            return found
+    raise ModelError("no cycle was found beside the equilibrium")
 
 
 def _doubled(cycle: Cycle) -> Cycle:
@@ -63,6 +101,54 @@ def _doubled(cycle: Cycle) -> Cycle:
     doubled = Shooting(motions, itinerary, period)
     u = doubled.unknowns(itinerary)
     return Cycle(doubled, u, doubled.shoot(u), 0.0)
+
+
+def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
+    """Return the cycle at the period doubling between two points of the branch of doubled ones.
+
+    Parameters
+    ----------
+    curve : CycleCurve
+        The branch, in one parameter.
+    one, other : ndarray
+        Points of it, on both sides of the place at which both halves are the same.
+
+    Raises
+    ------
+    ModelError
+        If it is not found.
+    """
+    shooting = curve.shooting
+    n, m = shooting.n, shooting.m
+    w = 0.5 * (one + other)
+    doubled = shooting.itinerary(w[: curve.n_unknowns])
+    states = np.array(doubled.starts).reshape(2, m // 2, n).mean(axis=0)
+    durations = np.array(doubled.durations).reshape(2, m // 2).mean(axis=0)
+    half = Itinerary(doubled.legs[: m // 2], doubled.t0, tuple(states), tuple(durations.tolist()))
+    motions = shooting.motions.with_derivatives_by(())
+    period = None if shooting.period is None else shooting.period.half()
+
+    def cycle_at(value: float) -> Cycle:
+        own = motions.copy()
+        own.use({**shooting.motions.params, curve.names[0]: value})
+        return cycle_of(own, half, period)
+
+    def value_at(value: float) -> float:
+        return float(np.prod(1.0 + cycle_at(value).multipliers).real)
+
+    # Secants: the parameter has an extremum on the branch of doubled cycles, and not on the single one.
+    a, b = float(w[-1]), float(w[-1]) + 1e-4 * float(curve.sizes[-1])
+    at_a, at_b = value_at(a), value_at(b)
+    for _ in range(30):
+        if at_a == at_b:
+            break
+        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
+        if abs(b - w[-1]) > 0.1 * curve.sizes[-1]:
+            raise ModelError("the period doubling is not near")
+        at_b = value_at(b)
+        if abs(b - a) < 1e-13 * float(curve.sizes[-1]):
+            break
+    return cycle_at(b)
 
 
 def _beside(curve: CycleCurve, code: str) -> State:
