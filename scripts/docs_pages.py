@@ -41,9 +41,9 @@ FROM_ROOT |= {"benchmarks/README.md": "benchmarks.md"}
 # The gallery by fields; an example that is not named here comes last.
 FIELDS = {
     "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks
-        two_masses stick_slip_cycle bouncing_ball structural_pounding""",
+        two_masses stick_slip_cycle bouncing_ball rocking_block structural_pounding""",
     "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order
-        thermostat""",
+        finite_time boolean_focus thermostat""",
     "Power electronics": "buck_converter rectifier",
     "Biology, climate": "gene_network neuron ocean",
     "Surfaces and where they meet": "plane_and_quadric hidden_dynamics curved_surface",
