@@ -43,9 +43,9 @@ FIELDS = {
     "Friction, impacts, mechanics": """stick_slip dry_friction drill_string friction_chain rubbing_blocks
         two_masses stick_slip_cycle bouncing_ball rocking_block structural_pounding""",
     "Control": """sliding_mode_control sampled_control relay_feedback relay_sliding relay_fourth_order
-        finite_time boolean_focus thermostat""",
+        finite_time thermostat""",
     "Power electronics": "buck_converter rectifier",
-    "Biology, climate": "gene_network neuron ocean",
+    "Biology, climate": "gene_network boolean_focus neuron ocean",
     "Surfaces and where they meet": "plane_and_quadric hidden_dynamics curved_surface",
     "Cycles and branches": """friction_branch belt_branch drill_string_branch impact_oscillator
         converter_doubling harvested_predators""",
