@@ -123,11 +123,11 @@ demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
 
-app: ## the interactive page, into python/filippov/app/static; skips by name what cannot be built here
-	@CARGO="$(CARGO)" sh scripts/build_app.sh
-
 figures: $(BUILD_STAMP) ## draw the figures of the theory pages and of the first page again
 	$(PY) scripts/theory_figures.py
+
+app: ## the interactive page, into python/filippov/app/static; skips by name what cannot be built here
+	@CARGO="$(CARGO)" sh scripts/build_app.sh
 
 docs-text: $(DOCS_STAMP) ## the documentation without running its code or compiling anything: for work on the text
 	FILIPPOV_DOCS=text NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet

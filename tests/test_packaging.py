@@ -23,10 +23,10 @@ def test_all_places_name_one_version() -> None:
     assert len(set(found.values())) == 1, found
     cargo = (ROOT / "Cargo.toml").read_text(encoding="utf-8")
     (version,) = set(found.values())
-    assert re.findall(r'^filippov.*path = .*version = "(.*?)"', cargo, re.MULTILINE) == [version, version]
+    assert set(re.findall(r'^filippov.*path = .*version = "(.*?)"', cargo, re.MULTILINE)) == {version}
     lock = (ROOT / "Cargo.lock").read_text(encoding="utf-8")
     locked = re.findall(r'^name = "filippov[a-z-]*"\nversion = "(.*)"$', lock, re.MULTILINE)
-    assert locked == [version] * 3
+    assert locked == [version] * len(list((ROOT / "crates").glob("*/Cargo.toml")))
 
 
 def test_the_notes_of_a_release_are_the_section_of_its_version() -> None:
