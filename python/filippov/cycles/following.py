@@ -249,8 +249,25 @@ def curve_of(state: State, names: tuple[str, ...], sizes: tuple[float, ...]) -> 
     return own, np.append(w, [state.params[name] for name in names])
 
 
-def at_value(state: State, name: str, value: float) -> State:
-    """Return the cycle or equilibrium with the same itinerary at another value of a parameter."""
+def at_value(state: State, name: str, value: float, most_halvings: int = 5) -> State:
+    """Return the cycle or equilibrium with the same itinerary at another value of a parameter.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge, also over values in between.
+    """
+    try:
+        return _at_value(state, name, value)
+    except ModelError:
+        if most_halvings == 0:
+            raise
+    middle = 0.5 * (state.params[name] + value)
+    half_way = at_value(state, name, middle, most_halvings - 1)
+    return at_value(half_way, name, value, most_halvings - 1)
+
+
+def _at_value(state: State, name: str, value: float) -> State:
     if isinstance(state, Cycle):
         motions = state._shooting.motions.with_derivatives_by(())
         motions.use({**state.params, name: value})

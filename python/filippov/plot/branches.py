@@ -30,7 +30,7 @@ _VIRTUAL = "not followed by the flow"
 _MARKERS = {
     "o": ("LP", "PD", "NS", "BP", "HB"),
     "s": ("PSN", "BE", "TF"),
-    "D": ("CS", "GS", "SS", "AS"),
+    "D": ("CS", "GS", "SS", "AS", "CO"),
     "^": ("GR",),
     "x": ("UZ",),
 }
