@@ -42,7 +42,7 @@ impl Rounds {
         }
         let Some(turn) = self.turn else { return false };
         self.n += 1;
-        if self.n % turn != 0 {
+        if !self.n.is_multiple_of(turn) {
             return false;
         }
         let round = &switches[last - turn..];
