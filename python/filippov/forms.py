@@ -48,8 +48,9 @@ class Source(NamedTuple):
         Whether surfaces were declared, even none at all (``surfaces=[]``): `fun` may then be a black box.
     discrete : tuple of str
         Parameters that resets may set: their values are those at the start.
-    root_ends : bool
-        Whether roots in the field end where their argument vanishes, and are zero beyond.
+    root_ends : {"", "surface", "floor"}
+        With ``"surface"`` roots in the field switch where their argument vanishes, and are zero beyond; with
+        ``"floor"`` they are zero beyond in the mode inside too, where a step looks a little further.
     beside : tuple of callable
         Events of a run that read tables or relays of their own.
     """
@@ -62,7 +63,7 @@ class Source(NamedTuple):
     black_box: bool = False
     resets: tuple[Reset, ...] = ()
     discrete: tuple[str, ...] = ()
-    root_ends: bool = False
+    root_ends: str = ""
     beside: tuple[Callable[..., Any], ...] = ()
 
     def named_functions(self) -> list[tuple[str, Any]]:

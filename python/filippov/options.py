@@ -386,7 +386,7 @@ def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None
     if progress is None or progress is False:
         return None
     if progress is True:
-        return Report(print_progress(t_span))
+        return Report(print_progress(t_span), is_printer=True)
     if callable(progress):
         return Report(progress)
     raise InputError("progress: True, False, or a function of the time reached, is needed")

@@ -83,18 +83,27 @@ class Prepared(NamedTuple):
         )
         return [(MEMORY, text)]
 
-    def stays_where_roots_are(self, run: Run) -> bool:
-        """Whether no root that the field reads along a run has a negative argument."""
+    def stays_where_roots_are(self, run: Run, p: Array, tolerance: float) -> bool:
+        """Whether no root that the field reads along a run has a negative argument, by more than a tolerance.
+
+        A motion that starts at the end of a root may be beside it for the rounding of its time.
+        """
         ends = () if self.trace is None else self.trace.ends
-
-        def reads_beyond(mode: tuple[int, ...]) -> bool:
-            beyond = [surface for surface, orientation in ends if mode[surface] * orientation < 0]
-            if not beyond:
-                return False
-            is_read = self.core.active(np.array(mode, dtype=np.float64))
-            return any(is_read[surface] for surface in beyond)
-
-        return not any(reads_beyond(mode) for mode in {segment[2] for segment in run.segments})
+        t, y = np.asarray(run.t), np.ascontiguousarray(run.y.T)
+        for t_start, t_end, mode, *_ in run.segments:
+            signs = np.array(mode, dtype=np.float64)
+            beyond = [(surface, side) for surface, side in ends if mode[surface] * side < 0]
+            if not beyond or t_end - t_start <= _INSTANT * (1.0 + abs(t_end)):
+                continue
+            is_read = self.core.active(signs)
+            inside = np.flatnonzero((t >= t_start) & (t <= t_end))
+            for surface, side in beyond:
+                if not is_read[surface]:
+                    continue
+                values = [self.core.surface_values(t[k], y[k], signs, p)[surface] * side for k in inside]
+                if not values or min(values) < -tolerance:
+                    return False
+        return True
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
@@ -203,6 +212,8 @@ class _Kept(NamedTuple):
 # Decision 0008: what makes it safe to keep a trace.
 _KEPT: Recent[_Kept] = Recent(32)
 _MOST_POINTS = 16
+# So long is an instant, in units of 1 plus the time.
+_INSTANT = 1e-12
 
 
 def _key(

@@ -15,16 +15,23 @@ class Report:
     Parameters
     ----------
     function : callable
+        ``function(t)``.
+    is_printer : bool, optional
+        Whether the function takes the number of switches in one place too, as `print_progress` does.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, is_printer: bool = False) -> None:
         self._function = function
+        self._is_printer = is_printer
         self.error: BaseException | None = None
 
-    def __call__(self, t: float) -> None:
-        """Tell the time reached."""
+    def __call__(self, t: float, n_switches_here: int = 0) -> None:
+        """Tell the time reached, and how many switches were in one place there if they are very many."""
         try:
-            self._function(t)
+            if self._is_printer:
+                self._function(t, n_switches_here)
+            else:
+                self._function(t)
         except BaseException as error:
             self.error = error
             raise
@@ -41,15 +48,16 @@ def print_progress(t_span: tuple[float, float]) -> Callable[..., None]:
     Returns
     -------
     callable
-        ``report(t)``; further arguments are ignored.
+        ``report(t, n_switches_here=0)``: very many switches in one place are named.
     """
     t_start, t_end = t_span
     length = (t_end - t_start) or 1.0
 
-    def report(t: float, *_: Any) -> None:
+    def report(t: float, n_switches_here: int = 0, *_: Any) -> None:
         fraction = (t - t_start) / length
         end = "\n" if fraction >= 1.0 else ""
-        sys.stderr.write(f"\rt = {t:<12.6g} {100 * fraction:5.1f} %{end}")
+        here = f", {n_switches_here} switches in one place" if n_switches_here else ""
+        sys.stderr.write(f"\rt = {t:<12.6g} {100 * fraction:5.1f} %{here:<34}{end}")
         sys.stderr.flush()
 
     return report

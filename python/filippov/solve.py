@@ -373,13 +373,20 @@ def _solve(
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run, used = run_of(prepared, choices)
         if run.reason == "field_not_finite" and t0 < t1:
-            ended = system.prepare_with_ends_of_roots(prepared, n, t0, state, values)
-            if ended is not None:
-                beyond, ended = run_of(ended, choices)
-                if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
-                    run, used = beyond, ended
+            parameters, nearest = parameter_vector(values), float(np.max(options.atol))
+            for ended in system.prepare_with_ends_of_roots(prepared, n, t0, state, values):
+                beyond, ending = run_of(ended, choices)
+                goes_further = beyond.status >= 0 or beyond.segments[-1][1] >= run.segments[-1][1]
+                stays = isinstance(beyond, Run) and ending.stays_where_roots_are(beyond, parameters, nearest)
+                if goes_further and stays:
+                    run, used = beyond, ending
+                if run.status >= 0:
+                    break
         has_events = specs is not None
         solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
+        if used.trace is not None and used.trace.root_ends == "floor":
+            # The end of a root is as steep as a jump.
+            solution.warnings = [found for found in solution.warnings if found.code != "undeclared_jump"]
         if wanted is not None:
             solution._origin = solution._origin._replace(events=tuple(specs or ()), args=constants)
         return solution

@@ -206,8 +206,10 @@ class RunWarning(NamedTuple):
         ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
         more surfaces at a root that is not stable for the given ``kappa``), ``"against_direction"`` (the
         surface of a reset was crossed against its direction), ``"unknown_side"`` (a start on the surface of
-        a reset without a direction), ``"one_sided"`` and ``"no_derivative"`` (about derivatives),
-        ``"memory"`` (the function assigns values that other calls may read) or ``"max_branches"``.
+        a reset without a direction), ``"at_rest"`` (rest where the fields are not regular), ``"averaged"``
+        (rounds that do not end are left to their mean), ``"one_sided"`` and ``"no_derivative"`` (about
+        derivatives), ``"memory"`` (the function assigns values that other calls may read) or
+        ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode

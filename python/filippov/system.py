@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -556,12 +556,14 @@ class System(Points, Saving):
 
     def prepare_with_ends_of_roots(
         self, prepared: Prepared, n: int, t0: float, y0: Array, values: dict[str, float]
-    ) -> Prepared | None:
-        """Return the system whose roots are zero beyond their end, a surface; None if it has none."""
+    ) -> Iterator[Prepared]:
+        """Yield the system whose roots are zero beyond their end, a surface, if any; then with a floor."""
         if self._source is None or prepared.trace is None or not prepared.trace.has_roots:
-            return None
-        ended = prepare(self._source._replace(root_ends=True), n, values, self._states, t0, y0)
-        return ended if ended.trace is not None and ended.trace.ends else None
+            return
+        for kind in ("surface", "floor"):
+            ended = prepare(self._source._replace(root_ends=kind), n, values, self._states, t0, y0)
+            if ended.trace is not None and ended.trace.ends:
+                yield ended
 
     def prepare_with_laws_of(
         self,
@@ -574,8 +576,7 @@ class System(Points, Saving):
         """Return the system with the tables and relays of events too; None after unpickling."""
         if self._source is None or prepared.trace is None:
             return None
-        root_ends = bool(prepared.trace.ends)
-        source = self._source._replace(beside=tuple(functions), root_ends=root_ends)
+        source = self._source._replace(beside=tuple(functions), root_ends=prepared.trace.root_ends)
         return prepare(source, len(y0), values, self._states, t0, y0)
 
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:

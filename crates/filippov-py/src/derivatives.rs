@@ -6,7 +6,7 @@ use filippov::derivative::{
     Borders, Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension,
     OneSided, Tangents, Term, Trail, WayBack, When,
 };
-use filippov::{Error, FieldError, Options, Problem, Side, Solution};
+use filippov::{Error, FieldError, Options, Problem, Reached, Side, Solution};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -86,7 +86,7 @@ pub fn run_with_derivatives(
     options: &Options,
     span: f64,
     (kinds, parameters, order): &Wanted,
-    interrupt: &mut dyn FnMut(f64) -> bool,
+    interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<(Solution, RunDerivatives), Failure> {
     let kinds: Vec<Column> = kinds
         .iter()

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::action::Actions;
 use filippov::derivative::{Exponents, Extension, Growth};
-use filippov::{Options, Problem, Solution, Stop};
+use filippov::{Options, Problem, Reached, Solution, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
@@ -62,7 +62,7 @@ pub fn growth_many<'py>(
         };
         let jobs = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
         let go = |(run, span, marks): &(PreparedRun, (f64, f64), &Vec<f64>),
-                  interrupt: &mut dyn FnMut(f64) -> bool|
+                  interrupt: &mut dyn FnMut(Reached) -> bool|
          -> Outcome {
             run.run_with_growth(*span, marks, (&options.options, &extension), interrupt)
         };
@@ -132,7 +132,7 @@ pub fn run_with_growth(
     (system, extension, actions): (&filippov::TracedSystem, &Arc<Extension>, &Actions<'_>),
     options: &Options,
     marks: &[f64],
-    interrupt: &mut dyn FnMut(f64) -> bool,
+    interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<(Solution, Growth), Failure> {
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;

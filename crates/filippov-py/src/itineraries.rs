@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::derivative::{Extended, Extension, HeldMotion};
 use filippov::motion::{Guard, RootEnd};
-use filippov::{leg, InstantRecord, LegError, Mode, Options, Over, Stop};
+use filippov::{leg, InstantRecord, LegError, Mode, Options, Over, Reached, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -121,7 +121,7 @@ impl HeldMotions {
                 places,
             };
             let of = (system, extended, actions);
-            let mut interrupt = |_: f64| {
+            let mut interrupt = |_: Reached| {
                 py.check_signals().is_err_and(|raised| {
                     raised.restore(py);
                     true

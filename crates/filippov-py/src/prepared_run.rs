@@ -7,7 +7,7 @@ use filippov::derivative::{Extension, Growth};
 use filippov::section::Section;
 use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Laws,
-    Options, Piece, Problem, Solution, TracedMap, UserEvent, UserFunction,
+    Options, Piece, Problem, Reached, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
@@ -96,7 +96,7 @@ impl PreparedRun {
         &self,
         t_span: (f64, f64),
         options: &Options,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         let (events, actions) = (self.user_events(), self.actions());
         Problem::new(&*self.core, t_span, &self.y0)
@@ -112,7 +112,7 @@ impl PreparedRun {
         t_span: (f64, f64),
         options: &Options,
         wanted: Option<(&Arc<Extension>, &Wanted)>,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<(Solution, Option<RunDerivatives>), Failure> {
         let Some((extension, wanted)) = wanted else {
             return Ok((self.run(t_span, options, interrupt)?, None));
@@ -143,7 +143,7 @@ impl PreparedRun {
         t_span: (f64, f64),
         marks: &[f64],
         (options, extension): (&Options, &Arc<Extension>),
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<(Solution, Growth), Failure> {
         let system = self.compiled.as_ref().ok_or(Failure::CalledMap)?;
         let actions = self.actions();
@@ -170,7 +170,7 @@ impl PreparedRun {
         t_span: (f64, f64),
         options: &Options,
         section: &Section,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         Problem::new(&*self.core, t_span, &self.y0)
             .options(options)

@@ -169,12 +169,25 @@ pub fn is_interruption(solution: &Solution) -> bool {
     raised.is_some_and(|e| Python::attach(|py| e.is_instance_of::<PyKeyboardInterrupt>(py)))
 }
 
+/// Of so many last switches a message names the surfaces.
+const LATEST: usize = 32;
+
 /// Why a run ended, where, and what to try.
 pub fn message_of(system: &dyn PiecewiseSystem, solution: &Solution, n_visible: usize) -> String {
     let mode = Mode::new(solution.mode.entries()[..n_visible].to_vec());
     let (t, x) = (solution.t_last, solution.last_state());
     let name = |j| system.surface_name(j);
-    let message = solution.stop.message(t, &mode, name);
+    let mut latest: Vec<usize> = solution
+        .switches
+        .iter()
+        .rev()
+        .take(LATEST)
+        .flat_map(|s| s.surfaces.to_vec())
+        .collect();
+    latest.sort_unstable();
+    latest.dedup();
+    let went_on = solution.stop.what_went_on(&solution.stats, &latest, name);
+    let message = solution.stop.message(t, &mode, name) + &went_on;
     match &solution.stop {
         Stop::NotFinite => match not_finite(system, t, x, &solution.discrete, &solution.mode) {
             Some(place) => format!("{message} {}", place.text(name)),

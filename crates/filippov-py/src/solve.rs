@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::derivative::Extension;
 use filippov::{
-    Clock, Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution, Stabilization,
+    Clock, Keep, Method, Mode, NonUnique, Options, Reached, SlidingRule, Solution, Stabilization,
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -60,14 +60,16 @@ pub fn solve(
     let (solution, derivatives) = py
         .detach(|| {
             let mut asked = options.clock.now();
-            let mut interrupt = |t: f64| {
+            let mut interrupt = |reached: Reached| {
                 let now = options.clock.now();
                 if now - asked < POLL_EVERY {
                     return false;
                 }
                 asked = now;
                 Python::attach(|py| {
-                    let reported = progress.as_ref().map(|report| report.call1(py, (t,)));
+                    let reported = progress
+                        .as_ref()
+                        .map(|report| report.call1(py, (reached.t, reached.n_switches_here)));
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
@@ -118,7 +120,7 @@ pub fn solve_many(
             PreparedRun::new(&system, t0, y0, p, &events, &actions)
         };
         let prepared = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
-        let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
+        let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(Reached) -> bool| {
             job.run_differentiated((t0, t1), &options.options, wanted, interrupt)
         };
         let is_last =

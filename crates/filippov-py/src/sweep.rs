@@ -5,7 +5,7 @@ use std::sync::Arc;
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
 use filippov::{
-    Error, Kind, Piece, SlidingRule, Solution, Stop, UserFunction, Warning, WarningCode,
+    Error, Kind, Piece, Reached, SlidingRule, Solution, Stop, UserFunction, Warning, WarningCode,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
@@ -59,7 +59,7 @@ pub fn solve_points<'py>(
         };
         let jobs = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
         let go = |(run, place, span): &(PreparedRun, Option<OwnPlace>, (f64, f64)),
-                  interrupt: &mut dyn FnMut(f64) -> bool|
+                  interrupt: &mut dyn FnMut(Reached) -> bool|
          -> Outcome {
             match (place, &section) {
                 (Some(place), Some(section)) => {

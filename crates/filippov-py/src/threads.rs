@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use filippov::Reached;
 use pyo3::prelude::*;
 
 /// How often the interpreter is asked for signals and told the progress.
@@ -12,8 +13,8 @@ pub const POLL_EVERY: Duration = Duration::from_millis(20);
 /// Runs that one thread takes before signals are looked at and results handed over.
 pub const CHUNK_PER_THREAD: usize = 256;
 
-/// What a run asks now and then with the time reached: is it to stop?
-pub type Interrupt<'a> = &'a mut dyn FnMut(f64) -> bool;
+/// What a run asks now and then with the place reached: is it to stop?
+pub type Interrupt<'a> = &'a mut dyn FnMut(Reached) -> bool;
 
 /// What threads have done of some jobs.
 pub struct Done<R> {
@@ -37,7 +38,7 @@ pub fn on_threads<J: Sync, R: Send>(
     let results: Vec<Mutex<Option<R>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let go = |asks: bool| {
         let mut asked = Instant::now();
-        let mut interrupt = |_: f64| {
+        let mut interrupt = |_: Reached| {
             if asks && asked.elapsed() >= POLL_EVERY {
                 asked = Instant::now();
                 if let Err(raised) = Python::attach(|py| py.check_signals()) {

@@ -110,7 +110,7 @@ pub use inspect::{
     Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, Leg, LegError,
     NotFinitePlace, Over, PointKind,
 };
-pub use integrate::{Integrator, Problem};
+pub use integrate::{Integrator, Problem, Reached};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{

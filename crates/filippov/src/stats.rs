@@ -31,6 +31,10 @@ pub struct Stats {
     pub n_extensions: u64,
     /// Switches.
     pub n_switches: u64,
+    /// Those in the place where the run ended, one after the other, if they are very many; else 0.
+    pub n_switches_here: u64,
+    /// The time of the first of those.
+    pub here_since: Option<f64>,
 }
 
 impl Stats {

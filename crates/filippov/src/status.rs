@@ -7,6 +7,7 @@ use crate::motion::weights::RuleFailure;
 use crate::motion::TwoFoldMotion;
 use crate::motion::{Guard, RootEnd};
 use crate::options::SlidingRule;
+use crate::stats::Stats;
 use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
@@ -143,6 +144,30 @@ impl Stop {
             Stop::SlidingRule { .. } => "sliding_rule",
             Stop::NonUnique { .. } | Stop::InvisibleTwoFold { .. } => "non_unique",
         }
+    }
+
+    /// What a run that was cut off was doing, if it made very many switches in one place at its end; empty else. `surfaces` are those
+    /// of its last switches.
+    pub fn what_went_on(
+        &self,
+        stats: &Stats,
+        surfaces: &[usize],
+        surface_name: impl Fn(usize) -> String,
+    ) -> String {
+        let is_cut_off = matches!(
+            self,
+            Stop::MaxEvents | Stop::MaxSteps | Stop::MaxWallTime | Stop::Interrupted
+        );
+        let since = stats.here_since.filter(|_| is_cut_off);
+        since.map_or_else(String::new, |since| {
+            let names: Vec<String> = surfaces.iter().map(|&j| surface_name(j) + " = 0").collect();
+            format!(
+                " {} switches since t = {since:.10} were in one place, at {}: the motion goes to and fro there. If its rounds \
+                 shrink without end, looser rtol and atol let their mean take over earlier.",
+                stats.n_switches_here,
+                names.join(", ")
+            )
+        })
     }
 
     /// What happened, where, and what to try.
@@ -296,11 +321,13 @@ pub enum WarningCode {
     UnknownSide,
     /// The motion rests at a point where the fields are not regular.
     AtRest,
+    /// Rounds that do not end are left to their mean.
+    Averaged,
 }
 
 impl WarningCode {
     /// All kinds, in an order that is part of the format of sweeps: only added to at the end.
-    pub const ALL: [WarningCode; 9] = [
+    pub const ALL: [WarningCode; 10] = [
         WarningCode::NonUnique,
         WarningCode::UndeclaredJump,
         WarningCode::NoSeries,
@@ -310,6 +337,7 @@ impl WarningCode {
         WarningCode::AgainstDirection,
         WarningCode::UnknownSide,
         WarningCode::AtRest,
+        WarningCode::Averaged,
     ];
 
     /// The bit that stands for this kind in a set of kinds: that of its place among [`ALL`](Self::ALL).
@@ -329,6 +357,7 @@ impl WarningCode {
             WarningCode::AgainstDirection => "against_direction",
             WarningCode::UnknownSide => "unknown_side",
             WarningCode::AtRest => "at_rest",
+            WarningCode::Averaged => "averaged",
         }
     }
 }

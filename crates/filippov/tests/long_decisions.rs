@@ -97,8 +97,8 @@ fn a_relay_problem_of_many_surfaces() {
 #[test]
 fn the_caller_interrupts_a_decision() {
     let (mut asked, options) = (0, Options::default());
-    let mut interrupt = |t: f64| {
-        assert_eq!(t, 0.0);
+    let mut interrupt = |reached: filippov::Reached| {
+        assert_eq!(reached.t, 0.0);
         asked += 1;
         asked == 30
     };

@@ -40,8 +40,8 @@ MOST_COMBINATIONS = 1024
 MOST_AFTER_MANY = 32
 MANY = 3
 
-# An expression that jumps is taken apart into that many parts at most.
-MOST_JUMPING_PARTS = 8
+# An expression that jumps is taken apart into that many parts at most: a limiter of a limiter has a dozen.
+MOST_JUMPING_PARTS = 32
 
 
 @dataclass(frozen=True)
@@ -450,10 +450,12 @@ class Tracer:
         self._roots[root] = (argument, None)
         return root
 
-    def with_ends_of_roots(self, field: list[int], root_ends: bool) -> list[int]:
+    def with_ends_of_roots(self, field: list[int], root_ends: str) -> list[int]:
         """Return a field whose cube roots switch with the sign of their argument: at zero they have no slope.
 
-        With `root_ends` the other roots switch too, and are zero where their argument is negative.
+        With `root_ends` the other roots switch too, and are zero where their argument is negative; if it is
+        ``"floor"``, in both modes: a step that starts at the end of a root may look beyond it, however short
+        it is.
         """
         builder = self.builder
         images: list[tuple[int, int]] = []
@@ -466,7 +468,8 @@ class Tracer:
                 size = builder.binary("power", self.absolute(argument), builder.constant(1.0 / 3.0))
                 images.append((root, builder.binary("multiply", self.sign(argument), size)))
             elif root_ends and self._switches_at(argument):
-                images.append((root, self.choose(argument, of(argument), builder.constant(0.0))))
+                inside = builder.unary("not negative", argument) if root_ends == "floor" else argument
+                images.append((root, self.choose(argument, of(inside), builder.constant(0.0))))
                 self.ends_of_roots.append(argument)
         return [builder.substituted(component, images) for component in field] if images else field
 

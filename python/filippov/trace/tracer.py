@@ -71,6 +71,8 @@ class Trace:
         Whether the field has a root that may end.
     ends : tuple of (int, float)
         For each end of a root that is a surface its index, and the sign of the side where the root is.
+    root_ends : str
+        How such roots go on, as in a `Source`.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
     """
@@ -88,6 +90,7 @@ class Trace:
     doubts: tuple[str, ...] = ()
     has_roots: bool = False
     ends: tuple[tuple[int, float], ...] = ()
+    root_ends: str = ""
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def is_exact_at_an_instant(self) -> tuple[bool, bool]:
@@ -110,7 +113,7 @@ def trace(
     states: Sequence[str] | None = None,
     discrete: Sequence[str] = (),
     is_field: bool = True,
-    root_ends: bool = False,
+    root_ends: str = "",
     beside: Sequence[Callable[..., Any]] = (),
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
@@ -145,8 +148,9 @@ def trace(
         Parameters whose values are those at the start only, since resets may set them.
     is_field : bool, optional
         Whether the function is the rate of the state; it has constants of motion then.
-    root_ends : bool, optional
-        Whether square roots and fractional powers are zero beyond their end, which is a surface then.
+    root_ends : {"", "surface", "floor"}, optional
+        Whether square roots and fractional powers are zero beyond their end, which is a surface then; with
+        ``"floor"`` also in the mode on its other side.
     beside : sequence of callables, optional
         Events ``g(t, x, *args)``: the system has their laws too, so that they can be traced beside it.
 
@@ -228,6 +232,7 @@ def trace(
         doubts=doubts,
         has_roots=tracer.has_roots(field),
         ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
+        root_ends=root_ends,
     )
 
 

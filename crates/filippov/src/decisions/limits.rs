@@ -15,7 +15,7 @@ use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
     ACCUMULATION_AGREEMENT, FAST_SHRINKING, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION,
-    ROUNDING, UNRESOLVED_FLIGHT,
+    ROUNDING, SLOW_SHRINKING, UNRESOLVED_FLIGHT,
 };
 
 /// The limit of accumulating switches or impacts.
@@ -30,20 +30,39 @@ pub(crate) struct Limit {
 
 impl Limit {
     /// The limit of the rest of a series of which the last four members are known, if the two quotients of intervals agree with
-    /// one another: the rest is geometric, up to a multiple of the square of the last interval.
+    /// one another and are those of a geometric series.
     fn of(turns: [&Switch; 4], surfaces: Vec<usize>) -> Option<Limit> {
-        let [before, last] = [turns[2], turns[3]];
         let [a, b, c] = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
-        let ratio = shrinks_by([b / a, c / b])?;
-        let share = ratio / (1.0 - ratio);
-        let states = last.y_after.iter().zip(&before.y_after);
+        let ratios = [b / a, c / b];
+        let noise = ROUNDING * turns[3].t.abs() / c;
+        shrinks_by(ratios).filter(|_| is_no_power(ratios, noise))?;
+        // Between impacts other bodies go on freely, by squares of the time.
+        let is_corrected = turns[3].kind == Kind::Reset && ratios[1] <= SLOW_SHRINKING;
+        let limit_of = |series: [f64; 3]| limit_of_series(series, ratios, is_corrected);
+        let states = turns[3].y_after.iter().enumerate();
+        let states = states.map(|(i, y)| limit_of([turns[1].y_after[i], turns[2].y_after[i], *y]));
         Some(Limit {
-            t: last.t + share * c,
-            x: states.map(|(y, before)| y + share * (y - before)).collect(),
+            t: limit_of([turns[1].t, turns[2].t, turns[3].t]),
+            x: states.collect(),
             surfaces,
             is_rest: false,
         })
     }
+}
+
+/// The limit of a series whose steps shrink by the ratio r, from its last members and the last two quotients of its steps: up to a
+/// multiple of r^(2n), or with the difference of two such limits of r^(3n).
+fn limit_of_series(
+    [first, before, last]: [f64; 3],
+    [earlier, ratio]: [f64; 2],
+    is_corrected: bool,
+) -> f64 {
+    let limit = last + ratio / (1.0 - ratio) * (last - before);
+    if !is_corrected {
+        return limit;
+    }
+    let limit_before = before + earlier / (1.0 - earlier) * (before - first);
+    limit + ratio * ratio / (1.0 - ratio * ratio) * (limit - limit_before)
 }
 
 /// The second of these ratios, if both lie between 0 and 1 and agree.
@@ -55,14 +74,15 @@ fn shrinks_by([first, second]: [f64; 2]) -> Option<f64> {
 }
 
 /// Are these the ratios of a geometric series, and not of one that shrinks like a power of the number of its members, and takes for
-/// ever? Those of such a series tend to 1, by a part of the square of their distance from it at each member.
-fn is_no_power([first, second]: [f64; 2]) -> bool {
+/// ever? Those of such a series tend to 1, by a part of the square of their distance from it at each member. `noise` is the
+/// rounding of a ratio: where it hides the difference, nothing is known.
+fn is_no_power([first, second]: [f64; 2], noise: f64) -> bool {
     let distance = 1.0 - second;
-    (first - second).abs() <= ACCUMULATION_AGREEMENT * distance * distance
+    (first - second).abs().max(noise) <= ACCUMULATION_AGREEMENT * distance * distance
 }
 
 /// Does a later switch repeat an earlier one?
-fn repeats(a: &Switch, b: &Switch) -> bool {
+pub(super) fn repeats(a: &Switch, b: &Switch) -> bool {
     a.surfaces == b.surfaces && a.mode_before == b.mode_before && a.mode_after == b.mode_after
 }
 
@@ -92,7 +112,8 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
         // At one surface slow turns need not be those of a geometric series.
         return Ok(None);
     }
-    let limit = shrinks_by(ratios).and_then(|_| Limit::of(turns, meeting));
+    let is_geometric = shrinks_by(ratios).is_some() && is_no_power(ratios, 0.0);
+    let limit = is_geometric.then(|| Limit::of(turns, meeting)).flatten();
     let Some(mut limit) = limit.filter(|limit| c < reach(at.scale, at.x) && limit.t > at.t) else {
         return Ok(None);
     };
@@ -102,17 +123,31 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
 
 /// The limit of crossings of one surface, to and fro, or of impacts there, at rates that shrink, where the last flight between
 /// two of them was shorter than the tolerance. Further flights would be rounding and error: they are as a geometric series
-/// would have them.
+/// would have them. On the two sides of the surface flights may shrink differently: a series is that of every second one, or of all.
 pub(crate) fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, FieldError> {
-    let [earlier @ .., second, third, last] = at.arrival.switches else {
+    for flights in [2, 1] {
+        let limit = limit_of_flights(at, flights)?;
+        if limit.is_some() {
+            return Ok(limit);
+        }
+    }
+    Ok(None)
+}
+
+/// The same of a series whose members are so many flights.
+fn limit_of_flights(at: &Point, flights: usize) -> Result<Option<Limit>, FieldError> {
+    let switches = at.arrival.switches;
+    let Some(earlier) = switches.len().checked_sub(2 * flights + 1) else {
         return Ok(None);
     };
+    let (earlier, turns) = switches.split_at(earlier);
+    let [second, third, last] = [0, flights, 2 * flights].map(|k| &turns[k]);
     let &[j] = &last.surfaces[..] else {
         return Ok(None);
     };
-    let is_same = |s: &&Switch| s.kind == last.kind && s.surfaces == last.surfaces;
+    let is_same = |s: &Switch| s.kind == last.kind && s.surfaces == last.surfaces;
     let is_passage = matches!(last.kind, Kind::Crossing | Kind::Reset);
-    if !is_passage || ![second, third].iter().all(is_same) {
+    if !is_passage || !turns.iter().all(is_same) {
         return Ok(None);
     }
     let Some(reduced) = at.system.reduced(&[j]) else {
@@ -120,10 +155,12 @@ pub(crate) fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, F
     };
     let [b, c] = [third.t - second.t, last.t - third.t];
     let s = c / b;
-    let shrinks = match earlier.last().filter(is_same) {
-        Some(first) => {
-            let r = b / (second.t - first.t);
-            r.max(s) <= FAST_SHRINKING || shrinks_by([r, s]).is_some() && is_no_power([r, s])
+    let noise = ROUNDING * last.t.abs() / c;
+    let first = earlier.len().checked_sub(flights).map(|k| &earlier[k..]);
+    let shrinks = match first.filter(|before| before.iter().all(is_same)) {
+        Some(before) => {
+            let r = b / (second.t - before[0].t);
+            r.max(s) <= FAST_SHRINKING || shrinks_by([r, s]).is_some() && is_no_power([r, s], noise)
         }
         None => s <= FAST_SHRINKING * FAST_SHRINKING,
     };
@@ -219,19 +256,80 @@ pub(crate) fn limits_of_impacts(
     Ok(limits)
 }
 
+/// Where and when impacts on several surfaces end whose sequence repeats itself, faster by the same factor each time: the limit of one
+/// whole round, at which all of these surfaces are in contact. `after` is the mode in which the bodies depart now.
+pub(crate) fn limit_of_impact_rounds(
+    at: &Point,
+    after: &Mode,
+) -> Result<Option<Limit>, FieldError> {
+    let switches = at.arrival.switches;
+    let Some(round) = round_of(switches) else {
+        return Ok(None);
+    };
+    let last = switches.len() - 1;
+    let mut surfaces: Vec<usize> = switches[last + 1 - round..]
+        .iter()
+        .flat_map(|s| s.surfaces.iter().copied())
+        .collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    let triggers = at.triggers();
+    if surfaces.len() < 2 || !surfaces.iter().all(|&j| triggers.is_only_trigger(j)) {
+        return Ok(None);
+    }
+    let signs = after.signs();
+    let near = reach(at.scale, at.x);
+    let mut h = vec![0.0; at.system.n_surfaces()];
+    at.system.surfaces(&at.place(&signs), &mut h)?;
+    let mut row = vec![0.0; at.x.len()];
+    for &j in &surfaces {
+        let rate = at.system.rate_gradient(j, &at.place(&signs), &mut row)?;
+        if rate.rate.abs() / dot(&row, &row).sqrt() >= near {
+            return Ok(None);
+        }
+        at.system.gradient(j, &at.place(&signs), &mut row)?;
+        if h[j].abs() / dot(&row, &row).sqrt() >= near {
+            return Ok(None);
+        }
+    }
+    let turns = [3, 2, 1, 0].map(|k| &switches[last - k * round]);
+    let mut contact = after.clone();
+    surfaces.iter().for_each(|&j| contact.set(j, 0));
+    let limit = Limit::of(turns, surfaces).filter(|limit| limit.t > at.t);
+    let Some(mut limit) = limit else {
+        return Ok(None);
+    };
+    limit.is_rest = true;
+    let sides = at.arrival.sides;
+    if let Some(mut field) = ContactField::new(at.system, at.actions, &contact, sides, at.q) {
+        field.project(limit.t, &mut limit.x)?;
+    }
+    Ok(Some(limit))
+}
+
+/// How many switches a round of impacts has, with those in which contact begins and ends, if the last three rounds repeat one
+/// another.
+fn round_of(switches: &[Switch]) -> Option<usize> {
+    let last = switches.len().checked_sub(1)?;
+    let is_impact = |s: &Switch| matches!(s.kind, Kind::Reset | Kind::Accumulation);
+    let repeats_after = |round: usize| {
+        let mut back = 0..2 * round;
+        last >= 3 * round
+            && back.all(|k| repeats(&switches[last - k], &switches[last - k - round]))
+            && switches[last + 1 - round..].iter().all(is_impact)
+    };
+    (2..=LONGEST_TURN).find(|&round| repeats_after(round))
+}
+
 /// Moves the state of a limit onto its surfaces.
-fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
+pub(super) fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
     let mut projector = Projector::new(limit.x.len(), at.system.n_surfaces());
     let setting = at.setting(at.arrival.signs);
-    for system in [Some(at.system), at.system.reduced(&limit.surfaces)] {
-        let Some(system) = system else { continue };
-        projector.project_onto(system, &limit.surfaces, limit.t, &mut limit.x, setting)?;
-    }
-    Ok(())
+    projector.project_onto_rates(at.system, &limit.surfaces, limit.t, &mut limit.x, setting)
 }
 
 /// Do the surfaces meet at the limit? Three lines in a plane need not.
-fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
+pub(super) fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
     let mut h = vec![0.0; at.system.n_surfaces()];
     let place = at.place_at(limit.t, &limit.x, at.arrival.signs);
     for system in [Some(at.system), at.system.reduced(&limit.surfaces)] {
@@ -338,7 +436,7 @@ fn stays_tangent(
 }
 
 /// Distance of a switch to the intersection, h_j in units of its gradient, and the same of the rates that vanish there.
-fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
+pub(super) fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
     let (signs, n) = (switch.mode_after.signs(), switch.y_after.len());
     let mut h = vec![0.0; at.system.n_surfaces()];
     let mut gradient = vec![0.0; n];
@@ -415,7 +513,7 @@ fn reach(scale: &ErrorScale, x: &[f64]) -> f64 {
 }
 
 /// How many switches a turn has, if the last three turns repeat.
-fn turn_of(switches: &[Switch]) -> Option<usize> {
+pub(super) fn turn_of(switches: &[Switch]) -> Option<usize> {
     let last = switches.last()?;
     let earlier = switches.iter().rev().skip(1).take(LONGEST_TURN);
     let turn = earlier
@@ -432,7 +530,7 @@ fn turn_of(switches: &[Switch]) -> Option<usize> {
 }
 
 /// The surfaces of a turn, with those slid on all along, if switches can accumulate there.
-fn meeting_of(at: &Point, turn: &[Switch]) -> Option<Vec<usize>> {
+pub(super) fn meeting_of(at: &Point, turn: &[Switch]) -> Option<Vec<usize>> {
     let mut meeting: Vec<usize> = turn
         .iter()
         .flat_map(|s| s.surfaces.iter().copied())

@@ -7,7 +7,7 @@ use super::point::{Decided, Left, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Leading, Projector};
+use crate::motion::{Leading, Level, Projector};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::{BothSides, PiecewiseSystem, Place};
 use crate::tolerances::{DOUBTFUL, ROUNDING};
@@ -62,10 +62,16 @@ impl<'a> Reduced<'a> {
         let mut projector = Projector::new(at.x.len(), signs.len());
         let mut h = vec![0.0; signs.len()];
         let mut order = 0;
+        let mut levels: SmallVec<[(&dyn PiecewiseSystem, Vec<usize>); 3]> = SmallVec::new();
         while let Some(next) = left.system.reduced(&left.surfaces) {
             order += 1;
             let (setting, system) = (at.setting(&signs), left.system);
-            projector.project_onto(system, &left.surfaces, at.t, &mut left.x, setting)?;
+            levels.push((system, left.surfaces.clone()));
+            let all: SmallVec<[Level<'_>; 3]> = levels
+                .iter()
+                .map(|(system, set)| (*system, &set[..]))
+                .collect();
+            projector.project_onto_levels(&all, at.t, &mut left.x, setting)?;
             let place = at.place_at(at.t, &left.x, &signs);
             next.surfaces(&place, &mut h)?;
             notes.n_surface_evaluations += 1;

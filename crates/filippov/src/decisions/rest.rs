@@ -2,10 +2,10 @@
 
 use super::limits::stay_on_all;
 use super::point::{Lefts, Next, Notes, Point};
-use super::rule::Meeting;
+use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{shares_of_rows, SmoothField};
+use crate::motion::{shares_of_rows, Projector, SmoothField};
 use crate::status::{Warning, WarningCode};
 use crate::system::eval_on_side;
 use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
@@ -35,8 +35,10 @@ pub(super) fn stay_if_nothing_leaves(
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
         let velocity = at.velocity(notes, &stays.mode, &[])?;
         let size = at.corners(notes, meeting.surfaces, meeting.mode)?.size();
-        let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
-        return Ok(is_rest.then_some(stays));
+        if velocity.iter().all(|v| v.is_finite()) {
+            let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
+            return Ok(is_rest.then_some(stays));
+        }
     }
     let is_isolated = m >= at.x.len();
     if !is_isolated || at.system.depends_on_time() || moves_on(at, notes, meeting)? {
@@ -46,6 +48,56 @@ pub(super) fn stay_if_nothing_leaves(
     let mut next = Next::new(meeting.on_all(&Mode::new(vec![0; m])), Lefts::new());
     next.start_mut().is_rest = true;
     Ok(Some(next))
+}
+
+/// A place at which a motion rests that can be followed no further.
+pub(crate) struct RestingPlace {
+    pub x: Vec<f64>,
+    pub surfaces: Vec<usize>,
+    pub next: Next,
+}
+
+/// The rest that a motion has come to, up to the tolerance, where it can be followed no further: several surfaces vanish within the
+/// tolerance, they meet within it, and no motion leaves them from there.
+pub(crate) fn rest_within_tolerance(
+    at: &Point,
+    notes: &mut Notes,
+) -> Result<Option<RestingPlace>, FieldError> {
+    let signs = at.arrival.signs;
+    let h = at.surface_values(notes, signs)?;
+    let mut row = vec![0.0; at.x.len()];
+    let mut surfaces = Vec::new();
+    for (j, h) in h.iter().enumerate() {
+        at.system.gradient(j, &at.place(signs), &mut row)?;
+        if at.arrival.active[j] && h.abs() <= at.scale.along(&row, at.x) {
+            surfaces.push(j);
+        }
+    }
+    let triggers = at.triggers();
+    let is_trigger = |j: &usize| triggers.is_only_trigger(*j);
+    if !(2..=MOST_AROUND_REST).contains(&surfaces.len()) || surfaces.iter().any(is_trigger) {
+        return Ok(None);
+    }
+    let mut x = at.x.to_vec();
+    let mut projector = Projector::new(x.len(), signs.len());
+    projector.project_onto_rates(at.system, &surfaces, at.t, &mut x, at.setting(signs))?;
+    let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
+    let there = at.moved(at.t, &x);
+    let h = there.surface_values(notes, signs)?;
+    for &j in &surfaces {
+        at.system.gradient(j, &there.place(signs), &mut row)?;
+        let is_on = h[j].abs() <= AT_SIDE * at.scale.along(&row, at.x);
+        if !is_on {
+            return Ok(None);
+        }
+    }
+    let is_near = at.scale.largest(&shift, at.x) <= 1.0;
+    if !is_near {
+        return Ok(None);
+    }
+    let meeting = Meeting::new(at.arrival.mode, &surfaces, &surfaces, How::Limit);
+    let next = stay_if_nothing_leaves(&there, notes, &meeting)?;
+    Ok(next.map(|next| RestingPlace { x, surfaces, next }))
 }
 
 /// Does a component of the state grow, or fall, by the fields of all regions? Then zero is not among their combinations.

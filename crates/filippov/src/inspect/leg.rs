@@ -2,7 +2,7 @@
 
 use crate::derivative::{Column, Extended, HeldMotion, Tangents};
 use crate::error::{Error, FieldError};
-use crate::integrate::Problem;
+use crate::integrate::{Problem, Reached};
 use crate::mode::Mode;
 use crate::options::{Keep, Options};
 use crate::record::Side;
@@ -48,7 +48,7 @@ pub fn leg(
         start,
         places,
     }: Over,
-    interrupt: &mut dyn FnMut(f64) -> bool,
+    interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<Leg, LegError> {
     let n = start.len();
     let impacts = extended.impacts();

@@ -20,7 +20,7 @@ use crate::error::{Error, FieldError};
 use crate::event::search::{Detector, StepSearch};
 use crate::event::{Event, Found};
 use crate::integrate::problem::{check, Problem};
-use crate::integrate::progress::Progress;
+use crate::integrate::progress::{Progress, Reached};
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
 use crate::motion::{Guard, Run, Slacks, SmoothField};
@@ -87,10 +87,10 @@ impl<'a> Integrator<'a> {
         })
     }
 
-    /// Asks `interrupt` every few steps, and during long decisions, with the time reached; the run stops where it returns
+    /// Asks `interrupt` every few steps, and during long decisions, with the place reached; the run stops where it returns
     /// `true`.
     #[must_use]
-    pub fn interruptible(mut self, interrupt: &'a mut (dyn FnMut(f64) -> bool + 'a)) -> Self {
+    pub fn interruptible(mut self, interrupt: &'a mut (dyn FnMut(Reached) -> bool + 'a)) -> Self {
         self.watch.ask(interrupt);
         self
     }
@@ -185,12 +185,15 @@ impl<'a> Integrator<'a> {
         if self.run.stats.n_switches >= self.run.options.max_events {
             return Ok(Some(Stop::MaxEvents));
         }
-        self.watch.look(attempts, self.run.t);
+        self.watch.look(attempts, self.progress.reached(self.run.t));
         if self.watch.has_ended() {
             return Ok(self.watch.stop());
         }
         match self.attempt_step() {
             Ok(None) => Ok(self.recorder.stop_at_section()),
+            Ok(Some(stop @ (Stop::NotFinite | Stop::StepTooSmall | Stop::NoProgress { .. }))) => {
+                self.rest_or_stop(stop)
+            }
             ended => ended,
         }
     }
@@ -425,6 +428,7 @@ impl<'a> Integrator<'a> {
         }
         self.run.stats.n_field_evaluations += self.run.motion.field.n_evaluations();
         self.run.stats.stiff_since = self.control.stiff_since();
+        self.progress.note_end(&mut self.run.stats);
         let sides = match self.run.actions.list.is_empty() {
             true => Vec::new(),
             false => self.run.motion.sides.to_vec(),

@@ -9,3 +9,4 @@ mod watch;
 
 pub use integrator::Integrator;
 pub use problem::Problem;
+pub use progress::Reached;

@@ -3,6 +3,7 @@
 use super::{Integrator, Problem};
 use crate::error::Error;
 use crate::event::UserEvent;
+use crate::integrate::progress::Reached;
 use crate::record::section::{Place, Section};
 use crate::record::{Observer, Solution};
 use crate::status::Stop;
@@ -24,7 +25,7 @@ impl Problem<'_> {
     /// As [`solve`](Self::solve).
     pub fn solve_interruptible(
         self,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         self.solve_with(None, interrupt)
     }
@@ -36,7 +37,7 @@ impl Problem<'_> {
     pub fn solve_observed(
         self,
         observer: &mut dyn Observer,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         self.solve_with(Some(observer), interrupt)
     }
@@ -44,7 +45,7 @@ impl Problem<'_> {
     fn solve_with(
         self,
         observer: Option<&mut dyn Observer>,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         let mut integrator = Integrator::new(self)?;
         if let Some(observer) = observer {
@@ -96,7 +97,7 @@ impl Problem<'_> {
     pub fn solve_to_section(
         self,
         section: &Section,
-        interrupt: &mut dyn FnMut(f64) -> bool,
+        interrupt: &mut dyn FnMut(Reached) -> bool,
     ) -> Result<Solution, Error> {
         let function = match section.place {
             Place::Function {

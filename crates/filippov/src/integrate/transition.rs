@@ -2,14 +2,15 @@
 
 use crate::action::{identity, quiet_change, Instant};
 use crate::decisions::limits::{
-    limit_here, limit_of_switches, limit_of_unresolved_flights, limits_of_impacts, passed_beside,
-    Limit, Passed,
+    limit_here, limit_of_impact_rounds, limit_of_switches, limit_of_unresolved_flights,
+    limits_of_impacts, passed_beside, Limit, Passed,
 };
 use crate::decisions::{
     add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
-    located_surfaces, refusal, sides, triggers_reached, warn_against_direction, warn_oscillation,
-    warn_unknown_side, warn_zero_surface, zero_surfaces, Cause, Decision, EndOfSliding, Leap, Left,
-    Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
+    located_surfaces, mean_of_rounds, refusal, rest_within_tolerance, sides, triggers_reached,
+    warn_against_direction, warn_oscillation, warn_unknown_side, warn_zero_surface, zero_surfaces,
+    Cause, Decision, EndOfSliding, Leap, Left, Lefts, Next, Notes, Point, Reached, RestingPlace,
+    Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
@@ -32,8 +33,8 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
     ) -> Result<R, FieldError> {
-        let (watch, t) = (&self.watch, self.run.t);
-        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
+        let (watch, reached) = (&self.watch, self.progress.reached(self.run.t));
+        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), reached);
         let scene = Scene {
             run: &mut self.run,
             velocity: self.stepper.start_derivative(),
@@ -99,6 +100,8 @@ impl<'a> Integrator<'a> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.run.stats.n_switches += 1;
+        self.progress
+            .note_place(self.run.t, &self.run.x, &self.run.scale);
         if self.recorder.observed.is_some() {
             self.recorder.leave(&mut self.run, &event.guards)?;
         }
@@ -202,6 +205,12 @@ impl<'a> Integrator<'a> {
                 if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                     return self.jump_to(limit, next.mode);
                 }
+                let (switches, scale) = (self.recorder.switches(), &self.run.scale);
+                if self.progress.rounds.are_small(switches, scale) {
+                    if let Some(mean) = self.ask(Cause::Start, mean_of_rounds)? {
+                        return self.jump_to(mean, next.mode);
+                    }
+                }
             }
         }
         self.begin(next, &event.multiple)
@@ -222,6 +231,36 @@ impl<'a> Integrator<'a> {
             surfaces.extend(named);
         }
         Ok(Some(Stop::NoProgress { surfaces }))
+    }
+
+    /// Where the motion can be followed no further: goes on at rest, if it has come to one within the tolerance. Else the run ends.
+    #[cold]
+    pub(super) fn rest_or_stop(&mut self, stop: Stop) -> Result<Option<Stop>, FieldError> {
+        let is_first = self.progress.rested.replace(self.run.t) != Some(self.run.t);
+        if !is_first || self.held.is_some() || self.watch.has_ended() {
+            return Ok(Some(stop));
+        }
+        let Some(rest) = self.ask(Cause::Start, rest_within_tolerance)? else {
+            return Ok(Some(stop));
+        };
+        let RestingPlace { x, surfaces, next } = rest;
+        let y_before = SmallVec::from_slice(&self.run.x);
+        self.run.x = x;
+        self.recorder.jump(self.run.t, &self.run.x);
+        self.recorder.user_events.forget_sides();
+        self.run.stats.n_switches += 1;
+        self.recorder.switch(Switch {
+            t: self.run.t,
+            y_before,
+            y_after: SmallVec::from_slice(&self.run.x),
+            kind: Kind::Accumulation,
+            surfaces: SmallVec::from_slice(&surfaces),
+            mode_before: self.run.motion.mode.clone(),
+            mode_after: next.mode.clone(),
+            note: String::new(),
+            rule: Rule::Limit.name(),
+        });
+        self.begin(next, &Multiple::default())
     }
 
     /// Records a switch between two modes that leaves the state as it is.
@@ -327,7 +366,9 @@ impl<'a> Integrator<'a> {
             _ => {}
         }
         self.evaluate_start()?;
-        if self.run.motion.sliding.len() > 1 {
+        // Rounds whose mean is followed turn around it.
+        let is_mean = |last: &Warning| last.code == WarningCode::Averaged && last.t == self.run.t;
+        if self.run.motion.sliding.len() > 1 && !self.warnings.last().is_some_and(is_mean) {
             self.ask(Cause::Start, |at, notes| {
                 warn_oscillation(at, notes);
                 Ok(())
@@ -688,6 +729,10 @@ impl<'a> Integrator<'a> {
         if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
             return self.jump_to(limit, next.mode);
         }
+        let rest = self.ask(Cause::Start, |at, _| limit_of_impact_rounds(at, &next.mode))?;
+        if let Some(rest) = rest.filter(|limit| limit.t <= self.horizon) {
+            return self.jump_to(rest, next.mode);
+        }
         let t = self.run.t;
         let stop = self.begin(next, &Multiple::default())?;
         if self.run.t == t {
@@ -705,7 +750,8 @@ impl<'a> Integrator<'a> {
             ..Notes::default()
         };
         let (watch, t, n) = (&self.watch, self.run.t, self.run.x.len());
-        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
+        let reached = self.progress.reached(t);
+        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), reached);
         let mut instant = Instant {
             run: &mut self.run,
             velocity: self.stepper.start_derivative(),
@@ -754,7 +800,7 @@ impl<'a> Integrator<'a> {
             .begin_segment(self.run.t, &before, SmallVec::new(), discrete);
         self.run.motion.mode = before.clone();
         let y_before = x.clone().into();
-        if t > self.run.t || !is_rest {
+        if t > self.run.t {
             self.move_straight(t, x)?;
         } else {
             self.run.x = x;
@@ -850,11 +896,8 @@ impl<'a> Integrator<'a> {
         let run = &mut self.run;
         let mut projector = Projector::new(run.x.len(), run.motion.signs.len());
         let setting = run.motion.setting();
-        projector.project(run.system, j, run.t, &mut run.x, setting)?;
-        if let Some(reduced) = run.system.reduced(&[j]) {
-            // The flights beside the surface are below its rounding.
-            projector.project(reduced, j, run.t, &mut run.x, setting)?;
-        }
+        // The flights beside a surface of higher degree are below its rounding.
+        projector.project_onto_rates(run.system, &[j], run.t, &mut run.x, setting)?;
         let stop = self.go_on_from_here(&[])?;
         if !self.run.motion.sliding().contains(&j) {
             if !self.run.motion.resting.contains(&j) {

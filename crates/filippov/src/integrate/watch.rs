@@ -3,11 +3,12 @@
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
 
+use crate::integrate::progress::Reached;
 use crate::options::Options;
 use crate::status::Stop;
 
-/// What the caller is asked every now and then, with the time reached: should the run end?
-pub(super) type Interrupt<'a> = &'a mut (dyn FnMut(f64) -> bool + 'a);
+/// What the caller is asked every now and then, with the place reached: should the run end?
+pub(super) type Interrupt<'a> = &'a mut (dyn FnMut(Reached) -> bool + 'a);
 
 /// Most steps between two looks at the clock and at the caller's wish to stop.
 const LONGEST_POLL: u64 = 64;
@@ -70,14 +71,14 @@ impl<'a> Watch<'a> {
 
     /// Looks now and then, after so many attempts at a step: the seldomer the faster they are.
     #[inline(always)]
-    pub fn look(&mut self, attempts: u64, t: f64) {
+    pub fn look(&mut self, attempts: u64, reached: Reached) {
         if attempts >= self.next {
-            self.look_now(attempts, t);
+            self.look_now(attempts, reached);
         }
     }
 
     #[cold]
-    fn look_now(&mut self, attempts: u64, t: f64) {
+    fn look_now(&mut self, attempts: u64, reached: Reached) {
         let now = self.now();
         let is_slow = |looked: Instant| (now - looked).as_secs_f64() > SLOW_POLL;
         self.interval = match self.looked.is_some_and(is_slow) {
@@ -85,11 +86,11 @@ impl<'a> Watch<'a> {
             false => (2 * self.interval).min(LONGEST_POLL),
         };
         (self.looked, self.next) = (Some(now), attempts + self.interval);
-        self.is_over(now, t);
+        self.is_over(now, reached);
     }
 
-    /// Has a limit been reached, now or before? `t` is the time that the run has reached.
-    pub fn is_over(&self, now: Instant, t: f64) -> bool {
+    /// Has a limit been reached, now or before? `reached` is the place that the run has come to.
+    pub fn is_over(&self, now: Instant, reached: Reached) -> bool {
         if self.over.get().is_none() {
             let elapsed = self.started.get().map(|started| now - started);
             let most = self.options.max_wall_time;
@@ -98,7 +99,9 @@ impl<'a> Watch<'a> {
                 .is_some_and(|(elapsed, most)| elapsed.as_secs_f64() > most);
             let wants_to_stop = || {
                 let mut interrupt = self.interrupt.borrow_mut();
-                interrupt.as_mut().is_some_and(|interrupt| interrupt(t))
+                interrupt
+                    .as_mut()
+                    .is_some_and(|interrupt| interrupt(reached))
             };
             if is_late {
                 self.over.set(Some(Over::WallTime));

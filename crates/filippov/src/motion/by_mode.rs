@@ -266,15 +266,11 @@ impl Motion for ReducedField<'_> {
         self.inner.multipliers()
     }
 
-    /// Moves `x` onto the surfaces, then onto their rates; twice, as each of the two may disturb the other.
+    /// Moves `x` onto the surfaces and onto their rates.
     fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        for _ in 0..2 {
-            let setting = self.setting.get();
-            self.projector
-                .project_onto(self.system, &self.surfaces, t, x, setting)?;
-            self.inner.project(t, x)?;
-        }
-        Ok(())
+        let setting = self.setting.get();
+        self.projector
+            .project_onto_rates(self.system, &self.surfaces, t, x, setting)
     }
 }
 

@@ -40,6 +40,7 @@ pub(crate) use leading::first_nonzero_of_both;
 pub use leading::{first_nonzero, normal_component, Leading};
 pub use meeting::MeetingFields;
 pub use monitored::{Deflation, Monitored};
+pub(crate) use project::Level;
 pub use project::{shares_of_rows, Projector};
 pub use region::RegionField;
 pub use rest::RestField;

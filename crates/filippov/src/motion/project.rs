@@ -1,9 +1,14 @@
 //! Projection onto a surface, or onto an intersection of surfaces.
 
+use smallvec::{smallvec, SmallVec};
+
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
 use crate::system::{dot, dot_magnitude, PiecewiseSystem, Place, Setting};
 use crate::tolerances::ROUNDING;
+
+/// A system, or one reduced from it, with surfaces to move onto.
+pub(crate) type Level<'s> = (&'s dyn PiecewiseSystem, &'s [usize]);
 
 /// Scratch space of the projection.
 #[derive(Clone, Debug)]
@@ -96,6 +101,70 @@ impl Projector {
             }
             let h: Vector = set.iter().map(|&j| self.h[j]).collect();
             let Some(shifts) = shares_of_rows(&self.rows, &h) else {
+                break;
+            };
+            for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
+                x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves `x` onto all surfaces of `set` and onto their rates, for those of higher relative degree, all at once: one after the other
+    /// each would disturb the others.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project_onto_rates(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        set: &[usize],
+        t: f64,
+        x: &mut [f64],
+        setting: Setting<'_>,
+    ) -> Result<(), FieldError> {
+        let mut levels: SmallVec<[Level<'_>; 3]> = smallvec![(system, set)];
+        let mut last = system;
+        while let Some(next) = last.reduced(set) {
+            levels.push((next, set));
+            last = next;
+        }
+        self.project_onto_levels(&levels, t, x, setting)
+    }
+
+    /// Moves `x` onto these surfaces of several systems at once, as [`project_onto`](Self::project_onto) does for one.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project_onto_levels(
+        &mut self,
+        levels: &[Level<'_>],
+        t: f64,
+        x: &mut [f64],
+        setting: Setting<'_>,
+    ) -> Result<(), FieldError> {
+        if let &[(system, set)] = levels {
+            return self.project_onto(system, set, t, x, setting);
+        }
+        let n = x.len();
+        let n_rows: usize = levels.iter().map(|(_, set)| set.len()).sum();
+        self.rows.resize(n * n_rows, 0.0);
+        for _ in 0..8 {
+            let place = setting.at(t, x);
+            let (mut is_near, mut values) = (true, Vector::new());
+            let mut rows = self.rows.chunks_exact_mut(n);
+            for &(system, set) in levels {
+                system.surfaces(&place, &mut self.h)?;
+                for (&j, row) in set.iter().zip(&mut rows) {
+                    system.gradient(j, &place, row)?;
+                    is_near &= self.h[j].abs() <= 0.25 * ROUNDING * dot_magnitude(row, x);
+                    values.push(self.h[j]);
+                }
+            }
+            if is_near {
+                break;
+            }
+            let Some(shifts) = shares_of_rows(&self.rows, &values) else {
                 break;
             };
             for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {

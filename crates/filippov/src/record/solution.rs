@@ -153,10 +153,7 @@ impl Solution {
             let (set, signs) = (mode.sliding_set().collect::<Vec<_>>(), mode.signs());
             let setting = Setting::new(&signs, discrete);
             let mut projector = Projector::new(n, system.n_surfaces());
-            projector.project_onto(system, &set, t, y, setting)?;
-            if let Some(reduced) = system.reduced(&set) {
-                projector.project_onto(reduced, &set, t, y, setting)?;
-            }
+            projector.project_onto_rates(system, &set, t, y, setting)?;
         }
         Ok(Some(mode))
     }

@@ -54,6 +54,12 @@ pub const NO_PROGRESS: f64 = 32768.0 * EPS;
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 
+/// So many switches in one place are worth a word: a run that goes on in time makes as many in many places.
+pub const MANY_SWITCHES: u64 = 100_000;
+
+/// Two states are in one place if no component differs by more than this part of its size.
+pub const SAME_PLACE: f64 = 0.1;
+
 /// Switches that are kept where only the last state is wanted: several turns of the longest accumulation.
 pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;
 

@@ -130,6 +130,18 @@ pub const STEPS_BESIDE_REST: usize = 6;
 /// Flights that shrink by this factor or more at a time end soon, whether the factors agree or not.
 pub const FAST_SHRINKING: f64 = 0.5;
 
+/// The limit of impacts is known to third order up to this ratio. Beyond it the difference of two limits of second order, times
+/// r^2 / (1 - r^2), is the rounding of the times between its members.
+pub const SLOW_SHRINKING: f64 = 0.95;
+
+/// Rounds whose ratio lies above this count as such that do not end; a geometric series of a smaller ratio is a limit before its rounds
+/// are below the tolerance.
+pub const STEADY_ROUNDS: f64 = 0.99;
+
+/// Where ever smaller rounds are left to their mean, the velocity of the last round is that of the motion that follows up to this
+/// part of its speed: the mean of a round differs by a multiple of its size, and another mean by a multiple of the speed.
+pub const SAME_MEAN: f64 = 1e-3;
+
 /// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
 /// of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;
