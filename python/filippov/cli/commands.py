@@ -47,7 +47,7 @@ def list_problems(given: argparse.Namespace) -> int:
 def print_completion(given: argparse.Namespace) -> int:
     """Print what makes a shell complete the command."""
     try:
-        from argcomplete import shellcode
+        from argcomplete.shell_integration import shellcode
     except ImportError as error:
         raise ImportError('completion needs argcomplete: pip install "filippov[completion]"') from error
     print(shellcode(["filippov"], shell=given.shell))

@@ -209,8 +209,9 @@ def numbered_colour(number: int, chosen: Theme) -> str | None:
 
     other = to_rgb(chosen.ground if level == 2 else chosen.ink)
     share = _SHADES[level]
-    mixed = [(1.0 - share) * a + share * b for a, b in zip(to_rgb(chosen.colours[place]), other, strict=True)]
-    return str(to_hex(mixed)) if level else chosen.colours[place]
+    own = to_rgb(chosen.colours[place])
+    red, green, blue = ((1.0 - share) * a + share * b for a, b in zip(own, other, strict=True))
+    return str(to_hex((red, green, blue))) if level else chosen.colours[place]
 
 
 def mode_colours(modes: Sequence[Mode], dark: bool | None) -> dict[Mode, str]:
