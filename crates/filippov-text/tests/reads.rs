@@ -80,7 +80,7 @@ fn what_is_not_read_has_a_place() {
         place("def f(t, x):\n    while True:\n        pass\n"),
         (2, 5)
     );
-    assert_eq!(place("def f(t, x, *rest):\n    return x\n"), (1, 14));
+    assert_eq!(place("def f(t, x, *rest):\n    return x\n"), (1, 13));
     assert_eq!(place(""), (1, 1));
 }
 

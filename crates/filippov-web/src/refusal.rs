@@ -29,6 +29,14 @@ impl Refusal {
     }
 }
 
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        out.write_str(&self.text)
+    }
+}
+
+impl std::error::Error for Refusal {}
+
 impl From<Error> for Refusal {
     fn from(error: Error) -> Self {
         Refusal {
