@@ -20,6 +20,8 @@ pub struct SectionRequest {
     count: u64,
 }
 
+type Function = Box<dyn Fn(f64, &[f64]) -> f64 + Sync>;
+
 enum Where {
     Surface {
         index: usize,
@@ -27,11 +29,14 @@ enum Where {
         kind: Option<Kind>,
     },
     State {
-        function: Box<dyn Fn(f64, &[f64]) -> f64 + Sync>,
+        function: Function,
         direction: f64,
     },
     /// One period for all runs, or one for each.
-    Ticks { periods: Vec<f64>, phase: f64 },
+    Ticks {
+        periods: Vec<f64>,
+        phase: f64,
+    },
 }
 
 impl SectionRequest {

@@ -132,65 +132,73 @@ impl Plane<'_> {
     pub fn sheets(&self, n: usize) -> Result<Vec<SheetPart>, FieldError> {
         let cells = self.window.cells;
         let side = cells + 1;
-        let corner = |column: usize, row: usize| {
-            let share = |index: usize| index as f64 / cells as f64;
-            self.window.at([share(column), share(row)])
-        };
         let mut values = Vec::with_capacity(side * side);
         for row in 0..side {
             for column in 0..side {
-                values.push(self.values(corner(column, row))?);
+                values.push(self.values(self.corner((column, row)))?);
             }
         }
         let mut parts = Vec::new();
         for j in 0..n {
-            let mut lines = Lines::default();
-            for row in 0..cells {
-                for column in 0..cells {
-                    // The corners, around the cell.
-                    let corners = [
-                        (column, row),
-                        (column + 1, row),
-                        (column + 1, row + 1),
-                        (column, row + 1),
-                    ];
-                    let mut ends = Vec::new();
-                    for k in 0..4 {
-                        let (a, b) = (corners[k], corners[(k + 1) % 4]);
-                        let at = |(column, row): (usize, usize)| values[row * side + column][j];
-                        if (at(a) < 0.0) == (at(b) < 0.0) || !(at(a) - at(b)).is_finite() {
-                            continue;
-                        }
-                        let name = (a.min(b), a.max(b));
-                        let place = match lines.places.get(&name) {
-                            Some(&place) => place,
-                            None => {
-                                let ends =
-                                    [name.0, name.1].map(|end| (corner(end.0, end.1), at(end)));
-                                let place = self.zero_between(j, ends)?;
-                                let place = place.map(|point| lines.add(point));
-                                lines.places.insert(name, place);
-                                place
-                            }
-                        };
-                        ends.extend(place);
-                    }
-                    match ends[..] {
-                        [a, b] => lines.join(a, b),
-                        // A saddle: the two pairs in their order around the cell.
-                        [a, b, c, d] => {
-                            lines.join(a, b);
-                            lines.join(c, d);
-                        }
-                        _ => {}
-                    }
-                }
-            }
-            for line in lines.chains() {
+            for line in self.lines(j, &values)?.chains() {
                 self.split(j, &line, &mut parts)?;
             }
         }
         Ok(parts)
+    }
+
+    /// The corner of a cell as a point.
+    fn corner(&self, (column, row): Corner) -> [f64; 2] {
+        let share = |index: usize| index as f64 / self.window.cells as f64;
+        self.window.at([share(column), share(row)])
+    }
+
+    /// The zeros of h_j on the edges of the cells, joined within each cell, by the values at all corners.
+    fn lines(&self, j: usize, values: &[Vec<f64>]) -> Result<Lines, FieldError> {
+        let cells = self.window.cells;
+        let side = cells + 1;
+        let mut lines = Lines::default();
+        for row in 0..cells {
+            for column in 0..cells {
+                // The corners, around the cell.
+                let corners = [
+                    (column, row),
+                    (column + 1, row),
+                    (column + 1, row + 1),
+                    (column, row + 1),
+                ];
+                let mut ends = Vec::new();
+                for k in 0..4 {
+                    let (a, b) = (corners[k], corners[(k + 1) % 4]);
+                    let at = |(column, row): (usize, usize)| values[row * side + column][j];
+                    if (at(a) < 0.0) == (at(b) < 0.0) || !(at(a) - at(b)).is_finite() {
+                        continue;
+                    }
+                    let name = (a.min(b), a.max(b));
+                    let place = match lines.places.get(&name) {
+                        Some(&place) => place,
+                        None => {
+                            let ends = [name.0, name.1].map(|end| (self.corner(end), at(end)));
+                            let place = self.zero_between(j, ends)?;
+                            let place = place.map(|point| lines.add(point));
+                            lines.places.insert(name, place);
+                            place
+                        }
+                    };
+                    ends.extend(place);
+                }
+                match ends[..] {
+                    [a, b] => lines.join(a, b),
+                    // A saddle: the two pairs in their order around the cell.
+                    [a, b, c, d] => {
+                        lines.join(a, b);
+                        lines.join(c, d);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(lines)
     }
 
     /// The zero of h_j on an edge; none where h_j jumps through zero.
@@ -208,7 +216,7 @@ impl Plane<'_> {
             middle = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
             let h = self.values(middle)?[j];
             least = h.abs();
-            if !(least > 1e-9 * size) {
+            if least <= 1e-9 * size || least.is_nan() {
                 break;
             }
             if (h < 0.0) == (ha < 0.0) {
