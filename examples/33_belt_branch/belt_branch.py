@@ -9,7 +9,8 @@ is constant and the cycle loses its sticking: it becomes the circle of radius vd
 With a damper, c = 0.1, the equilibrium is stable on a fast belt. It becomes so at a Hopf point (HB), where
 an unstable cycle begins. This cycle grows with vdr until it touches the belt at a grazing-sliding point (GS),
 and there it meets the stick-slip cycle: the branch turns back. Between the two points a push decides whether
-the block comes to rest or squeaks; beyond the second it always comes to rest. The Hopf point has a closed form,
+the block comes to rest or squeaks; beyond the second it always comes to rest. The Hopf point has a closed
+form,
 
     c = Fs delta / (1 + delta vdr)^2,
 
