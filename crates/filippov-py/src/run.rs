@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, not_finite, state_text, Held, Method, Mode, PiecewiseSystem, Segment, Side,
-    Solution, Stats, Stop,
+    as_multiplier, not_finite, state_text, Held, Kind, Method, Mode, PiecewiseSystem, Segment,
+    Side, Solution, Stats, Stop, Switch,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -97,6 +97,17 @@ impl Run {
     /// A mode as a user sees it.
     fn mode<'py>(&self, py: Python<'py>, mode: &Mode) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &mode.entries()[..self.n_visible])
+    }
+
+    /// The switches that a user sees: a crossing or a touch of surfaces without an entry in the mode is none.
+    fn visible_switches<'s>(&'s self, solution: &'s Solution) -> impl Iterator<Item = &'s Switch> {
+        let visible = |mode: &'s Mode| &mode.entries()[..self.n_visible];
+        let is_visible = move |s: &&'s Switch| {
+            !matches!(s.kind, Kind::Crossing | Kind::Grazing)
+                || s.surfaces.iter().any(|&j| j < self.n_visible)
+                || visible(&s.mode_before) != visible(&s.mode_after)
+        };
+        solution.switches.iter().filter(is_visible)
     }
 
     fn modes<'py>(&self, py: Python<'py>, modes: &[Mode]) -> PyResult<Vec<Bound<'py, PyTuple>>> {
@@ -225,20 +236,24 @@ impl Run {
         self.mode(py, &self.solution().mode)
     }
 
+    /// How many switches there are.
+    #[getter]
+    fn n_switches(&self) -> usize {
+        self.visible_switches(&self.solution()).count()
+    }
+
+    /// Their times.
+    #[getter]
+    fn switch_times<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        let solution = self.solution();
+        let times = self.visible_switches(&solution).map(|s| s.t);
+        PyArray1::from_vec(py, times.collect())
+    }
+
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
-        // A crossing or a touch of surfaces without an entry in the mode is not told.
-        let visible = |mode: &Mode| mode.entries()[..self.n_visible].to_vec();
-        let is_told = |s: &&filippov::Switch| {
-            !matches!(s.kind.name(), "crossing" | "grazing")
-                || s.surfaces.iter().any(|&j| j < self.n_visible)
-                || visible(&s.mode_before) != visible(&s.mode_after)
-        };
         let solution = self.solution();
-        solution
-            .switches
-            .iter()
-            .filter(is_told)
+        self.visible_switches(&solution)
             .map(|s| {
                 let visible = s.surfaces.iter().filter(|&&j| j < self.n_visible);
                 let visible: Vec<usize> = visible.copied().collect();

@@ -11,6 +11,9 @@ use crate::tolerances::ROUNDING;
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
+/// One of so many surfaces is evaluated by itself, more are evaluated with all others, for which the program is shorter.
+const FEW_OF_ALL: usize = 4;
+
 /// Scratch space of the event stage, and values of what is monitored.
 pub(crate) struct Detector {
     /// Exit functions computed in the search of this step, by theta.
@@ -68,12 +71,17 @@ impl Detector {
         (t, x, v): (f64, &[f64], &[f64]),
     ) -> Result<(), FieldError> {
         let (system, motion) = (run.system, &run.motion);
-        let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
-        if with_surfaces {
-            let place = motion.setting().at(t, x);
+        let surfaces = motion.monitored.iter().filter_map(Monitored::surface);
+        self.right.clear();
+        let place = motion.setting().at(t, x);
+        if motion.asleep.has_any() && FEW_OF_ALL * surfaces.clone().count() <= self.h.len() {
+            // Most surfaces are asleep: each other one by itself.
+            for j in surfaces {
+                (self.h[j], self.rate[j]) = system.surface_rate(j, &place, v)?;
+            }
+        } else if surfaces.clone().next().is_some() {
             system.surface_rates(&place, v, &mut self.h, &mut self.rate)?;
         }
-        self.right.clear();
         for m in &motion.monitored {
             self.right.push(match m.surface() {
                 Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
