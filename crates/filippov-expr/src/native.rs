@@ -71,7 +71,7 @@ impl NativeCode {
     }
 
     /// Runs the program; the caller has checked the lengths.
-    #[inline]
+    #[inline(always)]
     pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
         match &self.further {
             None => call(self.function, arguments, out, std::ptr::null_mut()),

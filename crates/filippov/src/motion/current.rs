@@ -195,6 +195,7 @@ impl<'a> CurrentMotion<'a> {
     }
 
     /// Finds what is known of the present mode.
+    #[inline(always)]
     fn recall(&mut self, system: &dyn PiecewiseSystem) {
         let place = self.known.iter().position(|known| known.mode == self.mode);
         self.current = place.unwrap_or_else(|| {
@@ -216,6 +217,7 @@ impl<'a> CurrentMotion<'a> {
 
     /// The Taylor series of the mode; `find` looks for them the first time: for those on the surfaces slid on, with these curved switching
     /// functions, or with all.
+    #[inline(always)]
     pub fn jets(
         &mut self,
         system: &dyn PiecewiseSystem,

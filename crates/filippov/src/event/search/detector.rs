@@ -71,22 +71,38 @@ impl Detector {
         (t, x, v): (f64, &[f64], &[f64]),
     ) -> Result<(), FieldError> {
         let (system, motion) = (run.system, &run.motion);
-        let surfaces = motion.monitored.iter().filter_map(Monitored::surface);
-        self.right.clear();
-        let place = motion.setting().at(t, x);
-        if motion.asleep.has_any() && FEW_OF_ALL * surfaces.clone().count() <= self.h.len() {
-            // Most surfaces are asleep: each other one by itself.
-            for j in surfaces {
-                (self.h[j], self.rate[j]) = system.surface_rate(j, &place, v)?;
-            }
-        } else if surfaces.clone().next().is_some() {
+        if motion.asleep.has_any() {
+            self.measure_awake(run, (t, x, v))?;
+        } else if motion.monitored.iter().any(|m| m.guard.is_surface()) {
+            let place = motion.setting().at(t, x);
             system.surface_rates(&place, v, &mut self.h, &mut self.rate)?;
         }
+        self.right.clear();
         for m in &motion.monitored {
             self.right.push(match m.surface() {
                 Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
                 None => (run.seen[m.place].end, f64::NAN),
             });
+        }
+        Ok(())
+    }
+
+    /// The switching functions that are monitored where others are asleep: each by itself, if they are few.
+    #[cold]
+    #[inline(never)]
+    fn measure_awake(
+        &mut self,
+        run: &Run,
+        (t, x, v): (f64, &[f64], &[f64]),
+    ) -> Result<(), FieldError> {
+        let (system, motion) = (run.system, &run.motion);
+        let place = motion.setting().at(t, x);
+        let awake = motion.monitored.iter().filter_map(Monitored::surface);
+        if FEW_OF_ALL * awake.clone().count() > self.h.len() {
+            return system.surface_rates(&place, v, &mut self.h, &mut self.rate);
+        }
+        for j in awake {
+            (self.h[j], self.rate[j]) = system.surface_rate(j, &place, v)?;
         }
         Ok(())
     }
