@@ -109,6 +109,7 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py
 	$(PY) benchmarks/speed.py
 	$(PY) benchmarks/friction_chain.py
+	$(PY) benchmarks/large.py
 	$(PY) benchmarks/work_precision.py
 	$(PY) benchmarks/accuracy.py
 	$(PY) benchmarks/stiff.py

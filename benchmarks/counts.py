@@ -7,10 +7,10 @@ problem in `GATED` exceed the baseline by more than 2 %. ``--only NAME ...`` cou
 
 Instructions and allocations are counted by callgrind; without valgrind they are left out. They are those of
 ``System.solve`` called again, Python included, without dense output, once its programs are native code. A
-program is interpreted up to its 2,000th call, so many runs precede the counted ones. Callgrind does not count
-them, which makes them about five times faster. Instructions do not depend on the load of the computer. They
-do depend on the versions of Python, NumPy and the compilers: with others, count the version of the baseline
-again.
+program is interpreted for its first 500 calls, until a thread has compiled it, so many runs precede the
+counted ones. Callgrind does not count them, which makes them about five times faster. Instructions do not
+depend on the load of the computer. They do depend on the versions of Python, NumPy and the compilers: with
+others, count the version of the baseline again.
 """
 
 from __future__ import annotations

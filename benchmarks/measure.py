@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import gc
+import os
+import platform
 from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
@@ -11,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Line", "at_equal_error", "interleaved", "report", "table", "write_section"]
+__all__ = ["Line", "at_equal_error", "circumstances", "interleaved", "report", "table", "write_section"]
 
 Array = npt.NDArray[np.float64]
 
@@ -151,6 +154,21 @@ def report(title: str, lines: Sequence[Line]) -> list[str]:
     text = table(("comparison", "measured", "target", "verdict", "figures"), rows)
     print(f"\n{title}\n", *text, sep="\n", flush=True)
     return [f"**{title}**", "", *text, ""]
+
+
+def circumstances() -> str:
+    """Return the date, the machine and its load in a sentence: what absolute figures depend on."""
+    processors, load = os.cpu_count() or 1, os.getloadavg()[1] if hasattr(os, "getloadavg") else float("nan")
+    names = [platform.processor() or platform.machine()]
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        lines = info.read_text(encoding="utf-8").splitlines()
+        names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")] or names
+    day = datetime.now(timezone.utc).date().isoformat()
+    return (
+        f"Measured on {day}: {names[0]}, {processors} processors, mean load of five minutes {load:.1f}, "
+        f"Python {platform.python_version()}, NumPy {np.__version__}."
+    )
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -207,6 +207,10 @@ class Run:
     @property
     def y_last(self) -> _Array: ...
     @property
+    def n_switches(self) -> int: ...
+    @property
+    def switch_times(self) -> _Array: ...
+    @property
     def switches(
         self,
     ) -> list[

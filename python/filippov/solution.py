@@ -24,6 +24,7 @@ from filippov.switches import (
     NO_DERIVATIVES,
     RunWarning,
     SegmentTable,
+    SwitchRows,
     SwitchTable,
     as_texts,
     at_switches,
@@ -398,9 +399,11 @@ class Solution:
     @cached_property
     def switches(self) -> SwitchTable:
         """Every change of mode."""
-        rows, derivatives = self._run.switches, None
-        if self._origin.wanted is not None and isinstance(self._run, Run):
-            derivatives = at_switches([row[0] for row in rows], self._run.instants())
+        if not isinstance(self._run, Run):
+            return SwitchTable(self._run.switches, self.surfaces, self.states, None, self.wrt)
+        rows, derivatives = SwitchRows(self._run), None
+        if self._origin.wanted is not None:
+            derivatives = at_switches(rows.t.tolist(), self._run.instants())
         return SwitchTable(rows, self.surfaces, self.states, derivatives, self.wrt)
 
     @property

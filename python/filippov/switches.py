@@ -243,6 +243,43 @@ class RunWarning(NamedTuple):
         return f"t = {self.t:.10g}: {self.message} [{self.code}{rule}]"
 
 
+class SwitchRows(Sequence[tuple[Any, ...]]):
+    """The switches of a run in the core: how many there are, and when, is known without a table of them."""
+
+    __slots__ = ("_rows", "_run")
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._rows: list[tuple[Any, ...]] | None = None
+
+    def __len__(self) -> int:
+        return self._run.n_switches
+
+    @overload
+    def __getitem__(self, index: int) -> tuple[Any, ...]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[tuple[Any, ...]]: ...
+    def __getitem__(self, index: int | slice) -> tuple[Any, ...] | list[tuple[Any, ...]]:
+        return self._all[index]
+
+    def __iter__(self) -> Iterator[tuple[Any, ...]]:
+        return iter(self._all)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return list, (self._all,)
+
+    @property
+    def t(self) -> Array:
+        """Times, shape (k,)."""
+        return self._run.switch_times
+
+    @property
+    def _all(self) -> list[tuple[Any, ...]]:
+        if self._rows is None:
+            self._rows = self._run.switches
+        return self._rows
+
+
 class SwitchTable(Sequence[Switch]):
     """The switches of a run in order of time: a sequence of `Switch` and a table with columns.
 
@@ -308,6 +345,8 @@ class SwitchTable(Sequence[Switch]):
     @property
     def t(self) -> Array:
         """Times, shape (k,)."""
+        if isinstance(self._rows, SwitchRows):
+            return self._rows.t
         return np.array([row[0] for row in self._rows], dtype=np.float64)
 
     @property

@@ -84,7 +84,7 @@ pub use jet::{JetProgram, Multipliers};
 pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;
-pub use program::{Backend, Program};
+pub use program::{has_native_code, Backend, Program};
 pub use region::{Discrete, Edge, Kind, PartSign, Pieces, Region, Regions, Split};
 pub use relative_degree::RateOnSurface;
 pub use schedule::Lengths;

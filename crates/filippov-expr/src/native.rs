@@ -1,10 +1,13 @@
 //! Native code by Cranelift. The only file with `unsafe`: calling the code, and freeing it.
 //!
-//! One function per program, generic in the signs, with the C signature of [`CompiledFunction`]. What is
+//! One function per program, generic in the signs, with the C signature of [`CompiledFunction`]; a large program is a
+//! chain of such functions, which hand values on in a buffer. What is
 //! not a machine instruction is a call of the same Rust function that the interpreter uses
 //! ([`UnaryOp::apply`], [`BinaryOp::apply`]), and Cranelift neither contracts nor reorders floating-point
 //! operations: both backends give the same bits.
 
+use std::cell::RefCell;
+use std::ops::Range;
 use std::sync::{Mutex, OnceLock};
 
 use cranelift_codegen::ir::condcodes::FloatCC;
@@ -23,25 +26,42 @@ use crate::op::{BinaryOp, UnaryOp};
 use crate::schedule::Schedule;
 use crate::tape::{Arguments, Tape};
 
-/// From this many nodes the fast register allocator is used: the better one takes more than linear time
-/// (29 s for 10^5 nodes) and gains some ten per cent.
-const SINGLE_PASS_FROM: usize = 5_000;
+/// Programs of more nodes are made of functions of this many, with the fast register allocator: the better one takes more than
+/// linear time (29 s for 10^5 nodes) and gains some ten per cent. The stack frame of a function grows with its nodes: this one has
+/// at most 32 KiB, which fits into the cache, and into the stack of any thread.
+const CHUNK: usize = 4_096;
 
-/// Beyond this many nodes compilation takes too long and the stack frame becomes too large.
-const TOO_LARGE_FROM: usize = 60_000;
-
-/// (t, x, s, p, v, out); the pointers are to as many numbers as the program's `Lengths` say.
+/// (t, x, s, p, v, out, handed on); the pointers are to as many numbers as the program's `Lengths` say, the last one to as many as
+/// are handed on from one function to another.
 type CompiledFunction =
-    unsafe extern "C" fn(f64, *const f64, *const f64, *const f64, *const f64, *mut f64);
+    unsafe extern "C" fn(f64, *const f64, *const f64, *const f64, *const f64, *mut f64, *mut f64);
+
+thread_local! {
+    /// What is handed on, kept between calls so that evaluation does not allocate.
+    static HANDED_ON: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+}
 
 /// A program in native code.
 pub(crate) struct NativeCode {
     function: CompiledFunction,
-    /// Keeps the memory of `function`.
+    /// What follows on the function of a large program.
+    further: Option<Box<Further>>,
+    /// Keeps the memory of the functions.
     _module: OwnedModule,
 }
 
+/// The other functions of a large program, in their order.
+struct Further {
+    functions: Vec<CompiledFunction>,
+    n_handed_on: usize,
+}
+
 impl NativeCode {
+    /// Does it work on this platform?
+    pub fn is_available() -> bool {
+        passes_self_test()
+    }
+
     /// Compiles a scheduled program.
     pub fn new(graph: &Graph, schedule: &Schedule) -> Result<Self, ExprError> {
         if !passes_self_test() {
@@ -50,28 +70,54 @@ impl NativeCode {
         compile(graph, schedule)
     }
 
-    /// Whether compiling is not worth while.
-    pub fn is_too_large(schedule: &Schedule) -> bool {
-        schedule.order.len() > TOO_LARGE_FROM
+    /// Runs the program; the caller has checked the lengths.
+    #[inline(always)]
+    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        match &self.further {
+            None => call(self.function, arguments, out, std::ptr::null_mut()),
+            Some(further) => self.run_all(further, arguments, out),
+        }
     }
 
-    /// Runs the program; the caller has checked the lengths.
-    #[inline]
-    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
-        let Arguments { t, x, s, p, v } = arguments;
-        // SAFETY: the code was made by `compile` for this signature and lives as long as `_module`. It reads
-        // x, s, p, v below the program's `Lengths` and writes `out` below its number of outputs, which
-        // `Program::eval`, the only caller beside the self-test, has compared with the slices.
-        unsafe {
-            (self.function)(
-                t,
-                x.as_ptr(),
-                s.as_ptr(),
-                p.as_ptr(),
-                v.as_ptr(),
-                out.as_mut_ptr(),
-            )
-        }
+    #[cold]
+    #[inline(never)]
+    fn run_all(&self, further: &Further, arguments: Arguments<'_>, out: &mut [f64]) {
+        HANDED_ON.with_borrow_mut(|handed_on| {
+            if handed_on.len() < further.n_handed_on {
+                handed_on.resize(further.n_handed_on, 0.0);
+            }
+            let handed_on = handed_on.as_mut_ptr();
+            call(self.function, arguments, out, handed_on);
+            for &function in &further.functions {
+                call(function, arguments, out, handed_on);
+            }
+        });
+    }
+}
+
+/// Calls one function of a program, with the lengths of the program.
+#[inline(always)]
+fn call(
+    function: CompiledFunction,
+    arguments: Arguments<'_>,
+    out: &mut [f64],
+    handed_on: *mut f64,
+) {
+    let Arguments { t, x, s, p, v } = arguments;
+    // SAFETY: the code was made by `compile` for this signature and lives as long as the `_module` of the `NativeCode`
+    // whose method called this. It reads x, s, p, v below the program's `Lengths` and writes `out` below its number of outputs,
+    // which `Program::eval`, the only caller beside the self-test, has compared with the slices. It reads and writes `handed_on`
+    // below `n_handed_on`, which is not null where that is not 0.
+    unsafe {
+        function(
+            t,
+            x.as_ptr(),
+            s.as_ptr(),
+            p.as_ptr(),
+            v.as_ptr(),
+            out.as_mut_ptr(),
+            handed_on,
+        )
     }
 }
 
@@ -140,7 +186,16 @@ fn target(single_pass: bool) -> Result<OwnedTargetIsa, ExprError> {
 }
 
 fn compile(graph: &Graph, schedule: &Schedule) -> Result<NativeCode, ExprError> {
-    let target = target(schedule.order.len() > SINGLE_PASS_FROM)?;
+    compile_in_chunks(graph, schedule, CHUNK)
+}
+
+/// Compiles a program into functions of so many nodes.
+fn compile_in_chunks(
+    graph: &Graph,
+    schedule: &Schedule,
+    chunk: usize,
+) -> Result<NativeCode, ExprError> {
+    let target = target(schedule.order.len() > chunk)?;
     let mut builder = JITBuilder::with_isa(target, default_libcall_names());
     let called = called_operations(graph, schedule);
     builder.symbols(
@@ -153,36 +208,59 @@ fn compile(graph: &Graph, schedule: &Schedule) -> Result<NativeCode, ExprError> 
     let Ok(Some(module)) = owner.0.get_mut() else {
         return unavailable("the module is gone");
     };
-    let id = match define(module, graph, schedule, &called) {
-        Ok(id) => id,
+    let handed_on = handed_on(graph, schedule, chunk);
+    let ids = match define(module, graph, schedule, &called, (chunk, &handed_on)) {
+        Ok(ids) => ids,
         Err(error) => return unavailable(error),
     };
-    let address = module.get_finalized_function(id);
-    // SAFETY: `define` gave the function exactly this signature, in the C convention of this machine.
-    let function = unsafe { std::mem::transmute::<*const u8, CompiledFunction>(address) };
+    let functions = ids.into_iter().map(|id| {
+        let address = module.get_finalized_function(id);
+        // SAFETY: `define` gave every function exactly this signature, in the C convention of this machine.
+        unsafe { std::mem::transmute::<*const u8, CompiledFunction>(address) }
+    });
+    let mut functions: Vec<CompiledFunction> = functions.collect();
+    let function = functions.remove(0);
+    let further = Further {
+        functions,
+        n_handed_on: handed_on.len(),
+    };
     Ok(NativeCode {
         function,
+        further: (!further.functions.is_empty()).then(|| Box::new(further)),
         _module: owner,
     })
 }
 
-/// Translates the program into one function of the module and makes it executable.
+/// The values that are used in other chunks than those that compute them, each with its place in the buffer. Variables and
+/// constants are read anew.
+fn handed_on(graph: &Graph, schedule: &Schedule, chunk: usize) -> FxHashMap<NodeId, u32> {
+    let mut places = FxHashMap::default();
+    if schedule.order.len() <= chunk {
+        return places;
+    }
+    for (position, &id) in schedule.order.iter().enumerate() {
+        let last_use = schedule.last_use.get(&id).copied().unwrap_or(position);
+        if last_use / chunk > position / chunk && is_computed(graph.node(id)) {
+            places.insert(id, places.len() as u32);
+        }
+    }
+    places
+}
+
+fn is_computed(node: &Node) -> bool {
+    node.operands().next().is_some()
+}
+
+/// Translates the program into functions of the module, one per chunk, and makes them executable.
 fn define(
     module: &mut JITModule,
     graph: &Graph,
     schedule: &Schedule,
     called: &[Operation],
-) -> Result<FuncId, Box<cranelift_module::ModuleError>> {
+    (chunk, handed_on): (usize, &FxHashMap<NodeId, u32>),
+) -> Result<Vec<FuncId>, Box<cranelift_module::ModuleError>> {
     let pointer = module.target_config().pointer_type();
-    let mut context = module.make_context();
-    let signature = &mut context.func.signature;
-    signature.params.push(AbiParam::new(types::F64));
-    signature.params.extend([AbiParam::new(pointer); 5]);
-    let id = module
-        .declare_function("program", Linkage::Local, &context.func.signature)
-        .map_err(Box::new)?;
-
-    let mut imports = FxHashMap::default();
+    let mut imported = Vec::new();
     for &operation in called {
         let mut signature = module.make_signature();
         signature
@@ -192,25 +270,38 @@ fn define(
         let import = module
             .declare_function(operation.symbol(), Linkage::Import, &signature)
             .map_err(Box::new)?;
-        imports.insert(
-            operation,
-            module.declare_func_in_func(import, &mut context.func),
-        );
+        imported.push((operation, import));
     }
-
+    let mut context = module.make_context();
     let mut function_context = FunctionBuilderContext::new();
-    let mut builder = FunctionBuilder::new(&mut context.func, &mut function_context);
-    let block = builder.create_block();
-    builder.append_block_params_for_function_params(block);
-    builder.switch_to_block(block);
-    builder.seal_block(block);
-    Translation::new(builder, imports)
-        .translate(graph, schedule)
-        .finalize(module.target_config());
-
-    module.define_function(id, &mut context).map_err(Box::new)?;
+    let mut ids = Vec::new();
+    let n_nodes = schedule.order.len();
+    for first in (0..n_nodes.max(1)).step_by(chunk) {
+        let signature = &mut context.func.signature;
+        signature.params.push(AbiParam::new(types::F64));
+        signature.params.extend([AbiParam::new(pointer); 6]);
+        let id = module
+            .declare_anonymous_function(&context.func.signature)
+            .map_err(Box::new)?;
+        let imports = imported.iter().map(|&(operation, import)| {
+            let reference = module.declare_func_in_func(import, &mut context.func);
+            (operation, reference)
+        });
+        let imports = imports.collect();
+        let mut builder = FunctionBuilder::new(&mut context.func, &mut function_context);
+        let block = builder.create_block();
+        builder.append_block_params_for_function_params(block);
+        builder.switch_to_block(block);
+        builder.seal_block(block);
+        Translation::new(builder, imports, handed_on)
+            .translate(graph, schedule, first..n_nodes.min(first + chunk))
+            .finalize(module.target_config());
+        module.define_function(id, &mut context).map_err(Box::new)?;
+        module.clear_context(&mut context);
+        ids.push(id);
+    }
     module.finalize_definitions().map_err(Box::new)?;
-    Ok(id)
+    Ok(ids)
 }
 
 /// An operation that is a call, not an instruction.
@@ -299,39 +390,63 @@ fn binary_function(op: BinaryOp) -> extern "C" fn(f64, f64) -> f64 {
 struct Translation<'a> {
     builder: FunctionBuilder<'a>,
     imports: FxHashMap<Operation, FuncRef>,
-    /// t, x, s, p, v, out
-    parameters: [Value; 6],
+    handed_on: &'a FxHashMap<NodeId, u32>,
+    /// t, x, s, p, v, out, handed on
+    parameters: [Value; 7],
     values: FxHashMap<NodeId, Value>,
     /// s_j > 0, by surface.
     conditions: FxHashMap<u32, Value>,
 }
 
 impl<'a> Translation<'a> {
-    fn new(builder: FunctionBuilder<'a>, imports: FxHashMap<Operation, FuncRef>) -> Self {
-        let mut parameters = [Value::from_u32(0); 6];
+    fn new(
+        builder: FunctionBuilder<'a>,
+        imports: FxHashMap<Operation, FuncRef>,
+        handed_on: &'a FxHashMap<NodeId, u32>,
+    ) -> Self {
+        let mut parameters = [Value::from_u32(0); 7];
         if let Some(block) = builder.current_block() {
             parameters.copy_from_slice(builder.block_params(block));
         }
         Translation {
             builder,
             imports,
+            handed_on,
             parameters,
             values: FxHashMap::default(),
             conditions: FxHashMap::default(),
         }
     }
 
-    fn translate(mut self, graph: &Graph, schedule: &Schedule) -> FunctionBuilder<'a> {
-        let mut stores = schedule.stores.iter().peekable();
-        for (position, &id) in schedule.order.iter().enumerate() {
-            let value = self.value(graph.node(id));
+    /// Translates the nodes at these positions.
+    fn translate(
+        mut self,
+        graph: &Graph,
+        schedule: &Schedule,
+        positions: Range<usize>,
+    ) -> FunctionBuilder<'a> {
+        let [.., out, handed_on] = self.parameters;
+        let flags = MemFlagsData::trusted();
+        let before = schedule
+            .stores
+            .partition_point(|store| store.0 < positions.start);
+        let mut stores = schedule.stores[before..].iter().peekable();
+        for position in positions {
+            let id = schedule.order[position];
+            let node = graph.node(id);
+            for operand in node.operands() {
+                self.recall(graph, operand);
+            }
+            let value = self.value(node);
             self.values.insert(id, value);
+            if let Some(&place) = self.handed_on.get(&id) {
+                let offset = offset(place);
+                self.builder.ins().store(flags, value, handed_on, offset);
+            }
             // Stored at once: the value need not stay alive to the end.
             while let Some(&&(_, output)) = stores.peek().filter(|store| store.0 == position) {
-                let [.., out] = self.parameters;
-                self.builder
-                    .ins()
-                    .store(MemFlagsData::trusted(), value, out, offset(output));
+                let offset = offset(output);
+                self.builder.ins().store(flags, value, out, offset);
                 stores.next();
             }
         }
@@ -339,8 +454,27 @@ impl<'a> Translation<'a> {
         self.builder
     }
 
+    /// Makes a value of an earlier chunk known in this one.
+    fn recall(&mut self, graph: &Graph, id: NodeId) {
+        if self.values.contains_key(&id) {
+            return;
+        }
+        let value = match self.handed_on.get(&id) {
+            None => self.value(graph.node(id)),
+            Some(&place) => {
+                let [.., handed_on] = self.parameters;
+                let flags = MemFlagsData::trusted();
+                let offset = offset(place);
+                self.builder
+                    .ins()
+                    .load(types::F64, flags, handed_on, offset)
+            }
+        };
+        self.values.insert(id, value);
+    }
+
     fn value(&mut self, node: &Node) -> Value {
-        let [t, x, s, p, v, _] = self.parameters;
+        let [t, x, s, p, v, ..] = self.parameters;
         match *node {
             Node::Constant(value) => self.builder.ins().f64const(value),
             Node::Time => t,
@@ -449,7 +583,11 @@ fn self_test() -> bool {
     let Ok(schedule) = Schedule::new(&graph, &outputs) else {
         return false;
     };
-    let Ok(native) = compile(&graph, &schedule) else {
+    // As one function, and as a chain of short ones.
+    let (Ok(whole), Ok(chain)) = (
+        compile(&graph, &schedule),
+        compile_in_chunks(&graph, &schedule, 7),
+    ) else {
         return false;
     };
     let tape = Tape::new(&graph, &schedule);
@@ -469,12 +607,13 @@ fn self_test() -> bool {
                 p: &p,
                 v: &v,
             };
-            let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![1.0; outputs.len()]);
+            let mut expected = vec![0.0; outputs.len()];
             tape.run(arguments, &mut expected);
-            native.run(arguments, &mut found);
-            expected
-                .iter()
-                .zip(&found)
-                .all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
+            [&whole, &chain].into_iter().all(|native| {
+                let mut found = vec![1.0; outputs.len()];
+                native.run(arguments, &mut found);
+                let mut pairs = expected.iter().zip(&found);
+                pairs.all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
+            })
         })
 }

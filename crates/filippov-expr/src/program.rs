@@ -11,8 +11,8 @@ use crate::tape::{Arguments, Tape};
 /// How a program is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Backend {
-    /// Native code if this build has it, the platform passes a self-test (once per process) and the
-    /// program is not too large for it; else the interpreter. Both give the same bits.
+    /// Native code if this build has it and the platform passes a self-test (once per process); else the
+    /// interpreter. Both give the same bits.
     #[default]
     Auto,
     /// Native code, or an error.
@@ -36,6 +36,15 @@ enum Code {
     #[cfg(feature = "native")]
     Native(NativeCode),
     Interpreted(Tape),
+}
+
+/// Does this build have native code on this platform?
+pub fn has_native_code() -> bool {
+    #[cfg(feature = "native")]
+    let is_there = NativeCode::is_available();
+    #[cfg(not(feature = "native"))]
+    let is_there = false;
+    is_there
 }
 
 impl Program {
@@ -152,9 +161,6 @@ impl Code {
         match backend {
             Backend::Interpreter => Ok(Code::Interpreted(Tape::new(graph, schedule))),
             Backend::Native => NativeCode::new(graph, schedule).map(Code::Native),
-            Backend::Auto if NativeCode::is_too_large(schedule) => {
-                Ok(Code::Interpreted(Tape::new(graph, schedule)))
-            }
             Backend::Auto => Ok(match NativeCode::new(graph, schedule) {
                 Ok(code) => Code::Native(code),
                 Err(_) => Code::Interpreted(Tape::new(graph, schedule)),

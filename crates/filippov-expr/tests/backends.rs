@@ -82,6 +82,30 @@ fn large_programs_agree() {
     assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
 }
 
+/// A chain of 10^5 operations and its derivative, in a thread with a small stack.
+#[test]
+fn deep_programs_need_no_deep_stack() {
+    let work = || {
+        let mut g = Graph::new();
+        let (x, half) = (g.state(0), g.constant(0.5));
+        let mut deep = x;
+        for _ in 0..50_000 {
+            let product = g.mul(half, deep);
+            deep = g.add(product, x);
+        }
+        let one = g.constant(1.0);
+        let slope = g.directional(deep, &[one]);
+        for backend in [Backend::Native, Backend::Interpreter] {
+            let program = Program::compile(&g, &[deep, slope], backend).unwrap();
+            let mut out = [0.0; 2];
+            program.eval(0.0, &[3.0], &[], &[], &[], &mut out);
+            assert_eq!(out, [6.0, 2.0]);
+        }
+    };
+    let thread = std::thread::Builder::new().stack_size(512 << 10);
+    thread.spawn(work).unwrap().join().unwrap();
+}
+
 #[test]
 fn threads_share_a_program() {
     let mut g = Graph::new();

@@ -199,6 +199,20 @@ impl Run {
         self.mode(py, &self.solution().mode)
     }
 
+    /// How many switches there are.
+    #[getter]
+    fn n_switches(&self) -> usize {
+        self.solution().switches_of_first(self.n_visible).count()
+    }
+
+    /// Their times.
+    #[getter]
+    fn switch_times<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        let solution = self.solution();
+        let times = solution.switches_of_first(self.n_visible).map(|s| s.t);
+        PyArray1::from_vec(py, times.collect())
+    }
+
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
         let solution = self.solution();

@@ -133,7 +133,7 @@ pub(crate) fn add_vanishing_surfaces(
         // A surface that the motion rests on while it slides is in the place of one that it slides on.
         let slides = arrival.mode.entries()[j] == 0
             || !arrival.sliding.is_empty() && arrival.resting.contains(&j);
-        if !arrival.active[j] || slides || surfaces.contains(&j) {
+        if !arrival.active[j] || slides || arrival.is_away(j) || surfaces.contains(&j) {
             continue;
         }
         let size = at.system.surface_size(j, &at.place(arrival.signs))?;

@@ -1,6 +1,6 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use crate::motion::Triggers;
+use crate::motion::{Asleep, Triggers};
 use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
@@ -93,6 +93,8 @@ pub(crate) struct Arrival<'p, 'a> {
     pub sides: &'p [i8],
     /// The surfaces whose sign matters in the mode.
     pub active: &'p [bool],
+    /// Surfaces that are proved to be away from here, where any are.
+    pub asleep: Option<&'p Asleep>,
     /// The surfaces whose functions were zero all along the motion.
     pub resting: &'p [usize],
     /// The surfaces that the motion is still leaving tangentially.
@@ -110,6 +112,11 @@ pub(crate) struct Arrival<'p, 'a> {
 }
 
 impl Arrival<'_, '_> {
+    /// Is a surface proved to be away from here?
+    pub fn is_away(&self, j: usize) -> bool {
+        self.asleep.is_some_and(|asleep| asleep.is_proved(j))
+    }
+
     /// The multipliers of the motion at the last evaluation of its field.
     pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         self.field.borrow().multipliers()

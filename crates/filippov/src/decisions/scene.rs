@@ -39,6 +39,7 @@ impl<'a> Scene<'_, 'a> {
             sliding: &motion.sliding,
             sides: &motion.sides,
             active: &motion.active,
+            asleep: motion.asleep.known_at(run.t, &run.x, &motion.discrete),
             resting: &motion.resting,
             departing,
             switches: self.switches,

@@ -166,6 +166,7 @@ pub fn classify(
         sliding: &sliding,
         sides: &sides_before,
         active: &active,
+        asleep: None,
         resting: &[],
         departing: SmallVec::new(),
         switches: &[],

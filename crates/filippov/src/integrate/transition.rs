@@ -335,7 +335,9 @@ impl<'a> Integrator<'a> {
         let t = self.run.t;
         let zeros = left.iter().filter_map(|left| left.deflation(t));
         let zeros: SmallVec<[_; 2]> = zeros.collect();
-        self.run.motion.restart(self.run.system, t, mode, &zeros);
+        let (system, x) = (self.run.system, &self.run.x);
+        self.run.motion.look_around(system, t, x);
+        self.run.motion.restart(system, t, mode, &zeros);
         if start.as_ref().is_some_and(|start| start.is_rest) {
             self.run.motion.rest(self.run.system);
         }

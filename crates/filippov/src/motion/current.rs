@@ -5,14 +5,15 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::{
-    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField, SlidingSet,
-    Triggers,
+    AffineBounds, Asleep, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField,
+    SlidingSet, Triggers,
 };
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::Actions;
 use crate::system::{MotionJets, PiecewiseSystem, Setting};
+use crate::tolerances::MOST_CHOSEN_SERIES;
 
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
@@ -45,6 +46,8 @@ pub(crate) struct CurrentMotion<'a> {
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     known: Vec<KnownMode>,
+    /// Surfaces that need not be monitored for the time being.
+    pub asleep: Asleep,
     /// The place of the present mode among them.
     current: usize,
     pub monitored: Vec<Monitored>,
@@ -76,6 +79,7 @@ impl<'a> CurrentMotion<'a> {
         mode: Mode,
         law: Law<'a>,
         actions: &'a Actions<'a>,
+        asleep: Asleep,
     ) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let setting = Setting::new(&signs, &actions.discrete);
@@ -88,6 +92,7 @@ impl<'a> CurrentMotion<'a> {
             sliding,
             idle: Vec::new(),
             known: Vec::with_capacity(MOST_KNOWN),
+            asleep,
             current: 0,
             monitored: Vec::new(),
             sticks: false,
@@ -190,6 +195,7 @@ impl<'a> CurrentMotion<'a> {
     }
 
     /// Finds what is known of the present mode.
+    #[inline(always)]
     fn recall(&mut self, system: &dyn PiecewiseSystem) {
         let place = self.known.iter().position(|known| known.mode == self.mode);
         self.current = place.unwrap_or_else(|| {
@@ -209,13 +215,20 @@ impl<'a> CurrentMotion<'a> {
         self.active = SmallVec::from_slice(&self.known[self.current].active);
     }
 
-    /// The Taylor series of the mode; `find` looks for them the first time.
+    /// The Taylor series of the mode; `find` looks for them the first time: for those on the surfaces slid on, with these curved switching
+    /// functions, or with all.
+    #[inline(always)]
     pub fn jets(
         &mut self,
-        find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>,
+        system: &dyn PiecewiseSystem,
+        find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
     ) -> Option<Arc<MotionJets>> {
-        let known = &mut self.known[self.current].jets;
-        known.get_or_insert_with(|| find(&self.sliding)).clone()
+        if self.known[self.current].jets.is_none() {
+            let awake = self.curved_awake(system);
+            let found = find(&self.sliding, awake.as_deref());
+            self.known[self.current].jets = Some(found);
+        }
+        self.known[self.current].jets.clone().flatten()
     }
 
     fn find_monitored(&mut self, system: &dyn PiecewiseSystem, zeros: &[(Guard, Deflation)]) {
@@ -248,7 +261,6 @@ impl<'a> CurrentMotion<'a> {
         if self.is_held {
             return;
         }
-        let signs = &self.signs;
         let monitor = |guard, place, orientation, affine| Monitored {
             guard,
             place,
@@ -260,14 +272,88 @@ impl<'a> CurrentMotion<'a> {
             deflation: None,
             noise: 0.0,
         };
-        let surfaces = (0..signs.len()).filter(|&j| {
-            self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
-        });
-        self.monitored
-            .extend(surfaces.map(|j| monitor(Guard::Surface(j), j, signs[j], system.is_affine(j))));
+        for j in 0..self.signs.len() {
+            if self.is_to_monitor(j) {
+                let affine = system.is_affine(j);
+                let listed = monitor(Guard::Surface(j), j, self.signs[j], affine);
+                self.monitored.push(listed);
+            }
+        }
         let exits = self.field.guards().into_iter().enumerate();
         self.monitored
             .extend(exits.map(|(place, guard)| monitor(guard, place, 1.0, false)));
+    }
+
+    /// Is a surface monitored in this mode, as far as it is not asleep?
+    fn is_to_monitor(&self, j: usize) -> bool {
+        let side = self.mode.entries()[j];
+        self.active[j] && side != 0 && !self.resting.contains(&j) && !self.asleep.has(j, side)
+    }
+
+    /// The motion is about to start at this point: finds out which surfaces are asleep there.
+    pub fn look_around(&mut self, system: &dyn PiecewiseSystem, t: f64, x: &[f64]) {
+        if self.asleep.is_used() && !self.asleep.contains_point(t, x, &self.discrete) {
+            self.asleep.look_around(system, t, x, &self.discrete);
+            self.known.clear();
+        }
+    }
+
+    /// The motion leaves the box in which surfaces are asleep, along a step over these ranges of time and states: lists anew what is
+    /// monitored, and returns the places of what was not.
+    pub fn wake(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        ranges: &[[f64; 2]],
+    ) -> SmallVec<[usize; 8]> {
+        self.asleep.follow(system, ranges, &self.discrete);
+        self.list_again(system)
+    }
+
+    /// Monitors all surfaces from now on; returns the places of those that were asleep.
+    pub fn wake_all(&mut self, system: &dyn PiecewiseSystem) -> SmallVec<[usize; 8]> {
+        self.asleep.end();
+        self.list_again(system)
+    }
+
+    /// Lists anew what is monitored; what was monitored stays as it was, and what is divided out stays monitored.
+    fn list_again(&mut self, system: &dyn PiecewiseSystem) -> SmallVec<[usize; 8]> {
+        self.known.clear();
+        self.recall(system);
+        let before = std::mem::take(&mut self.monitored);
+        self.list_monitored(system);
+        let mut woken = SmallVec::new();
+        for (place, m) in self.monitored.iter_mut().enumerate() {
+            match before.iter().find(|other| other.guard == m.guard) {
+                Some(known) => *m = *known,
+                None => woken.push(place),
+            }
+        }
+        let is_listed = |m: &&Monitored| self.monitored.iter().any(|n| n.guard == m.guard);
+        let kept: SmallVec<[Monitored; 2]> = before
+            .iter()
+            .filter(|m| m.deflation.is_some() && !is_listed(m))
+            .copied()
+            .collect();
+        self.monitored.extend(kept);
+        woken
+    }
+
+    /// The curved switching functions that are not asleep, if surfaces are asleep and these are few.
+    pub fn curved_awake(&self, system: &dyn PiecewiseSystem) -> Option<SmallVec<[usize; 4]>> {
+        if !self.asleep.has_any() {
+            return None;
+        }
+        let mut awake = SmallVec::new();
+        for j in (0..self.signs.len()).filter(|&j| !system.is_affine(j)) {
+            if self.asleep.is_proved(j) {
+                continue;
+            }
+            if awake.len() == MOST_CHOSEN_SERIES {
+                return None;
+            }
+            awake.push(j);
+        }
+        Some(awake)
     }
 
     /// The surfaces that it still leaves tangentially.

@@ -2,6 +2,7 @@
 
 mod affine;
 mod affine_bounds;
+mod asleep;
 mod by_mode;
 mod by_rule;
 mod canopy;
@@ -27,6 +28,7 @@ pub mod weights;
 
 pub use affine::AffineLaw;
 pub use affine_bounds::{AffineBounds, EnclosedMultipliers};
+pub(crate) use asleep::Asleep;
 pub(crate) use by_mode::{Law, ModeField, SlidingSet};
 pub use by_rule::RuleLaw;
 pub use canopy::Canopy;

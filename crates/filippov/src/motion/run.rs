@@ -1,6 +1,6 @@
 //! A run at the place that it has reached.
 
-use super::{CurrentMotion, Seen};
+use super::{Asleep, CurrentMotion, Seen};
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::options::Options;
@@ -45,7 +45,14 @@ impl<'a> Run<'a> {
             scale: ErrorScale::new(options.rtol, &options.atol, x.len()),
             t,
             x: x.to_vec(),
-            motion: CurrentMotion::new(system, t, undecided, options.into(), actions),
+            motion: CurrentMotion::new(
+                system,
+                t,
+                undecided,
+                options.into(),
+                actions,
+                Asleep::new(system, options),
+            ),
             seen: Vec::new(),
             residuals: Vec::new(),
             passing: Vec::new(),

@@ -163,6 +163,7 @@ pub fn replay_decision(
         sliding: &sliding,
         sides: &point.sides,
         active: &active,
+        asleep: None,
         resting: &point.resting,
         departing: SmallVec::from_slice(&point.departing),
         switches: &[],

@@ -385,6 +385,13 @@ impl<'a> Recorder<'a> {
         if self.keep == Keep::Last {
             self.switches.clear();
         }
+        if self.keep != Keep::Steps {
+            // A result may be kept for long, beside many others.
+            self.switches.shrink_to_fit();
+            self.segments.shrink_to_fit();
+            self.t.shrink_to_fit();
+            self.y.shrink_to_fit();
+        }
         Solution {
             y_end: jump.map(|(_, y)| y),
             n_states: self.n,

@@ -12,6 +12,8 @@ pub(super) struct BandLu {
     b: usize,
     /// Entry (i, j) at i (3 b + 1) + j - i + b, for j - i from -b to 2 b.
     entries: Vec<f64>,
+    /// The factors by which row k was taken from the b rows behind it, at k b.
+    factors: Vec<f64>,
     exchanges: Vec<usize>,
     /// Multiplications and divisions so far.
     pub n_operations: usize,
@@ -23,6 +25,8 @@ impl BandLu {
         (self.n, self.b) = (n, b);
         self.entries.clear();
         self.entries.resize(n * (3 * b + 1), 0.0);
+        self.factors.clear();
+        self.factors.resize(n * b, 0.0);
         self.exchanges.clear();
     }
 
@@ -71,12 +75,13 @@ impl BandLu {
                 continue;
             }
             let factor = self.entries[below] / diagonal;
-            self.entries[below] = factor;
-            let (row, pivot_row) = (self.at(i, k), self.at(k, k));
-            for offset in 1..=end - k {
-                self.entries[row + offset] -= factor * self.entries[pivot_row + offset];
-            }
-            self.n_operations += end - k + 1;
+            self.factors[k * self.b + i - k - 1] = factor;
+            let (pivot, n) = (self.at(k, k) + 1, end - k);
+            // Row i begins behind the end of row k.
+            let (upper, lower) = self.entries.split_at_mut(below + 1);
+            let pairs = lower[..n].iter_mut().zip(&upper[pivot..pivot + n]);
+            pairs.for_each(|(entry, above)| *entry -= factor * above);
+            self.n_operations += n + 1;
         }
     }
 
@@ -84,11 +89,12 @@ impl BandLu {
     pub fn solve(&mut self, x: &mut [f64]) {
         for k in 0..self.n {
             x.swap(k, self.exchanges[k]);
-            let last = (k + self.b).min(self.n - 1);
-            for i in k + 1..=last {
-                x[i] -= self.entries[self.at(i, k)] * x[k];
-            }
-            self.n_operations += last - k;
+            let n = self.b.min(self.n - 1 - k);
+            let (known, behind) = x.split_at_mut(k + 1);
+            let factors = &self.factors[k * self.b..k * self.b + n];
+            let pairs = behind.iter_mut().zip(factors);
+            pairs.for_each(|(x, factor)| *x -= factor * known[k]);
+            self.n_operations += n;
         }
         self.back_substitute(x, self.n);
         self.n_operations += self.n * (2 * self.b + 1);

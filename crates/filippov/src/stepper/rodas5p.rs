@@ -7,7 +7,7 @@ use super::duties::Ready;
 use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, Run, SmoothField};
-use crate::sparse::SparseSolver;
+use crate::sparse::{BorderedSolver, SparseRows};
 use crate::system::{Linearisation, MotionJacobian};
 use crate::tolerances::EPS;
 
@@ -25,7 +25,7 @@ pub struct Rodas5p {
     linearisation: Linearisation,
     /// The linearisation belongs to the current start.
     is_linearised: bool,
-    solver: SparseSolver,
+    solver: BorderedSolver,
     /// U_i, and behind them the multipliers.
     increments: [Vec<f64>; 8],
     stage: Vec<f64>,
@@ -41,7 +41,7 @@ impl Rodas5p {
             jacobian: None,
             linearisation: Linearisation::dense(0),
             is_linearised: false,
-            solver: SparseSolver::for_all_pivots(),
+            solver: BorderedSolver::new(&SparseRows::new(0)),
             increments: std::array::from_fn(|_| zeros()),
             stage: zeros(),
             step: Step::new(n, Interpolant::powers(n, 4)),
@@ -53,6 +53,7 @@ impl Rodas5p {
     pub fn restart(&mut self, linearisation: Linearisation) {
         let size = linearisation.n_unknowns();
         self.increments.iter_mut().for_each(|u| u.resize(size, 0.0));
+        self.solver.restart(linearisation.rows());
         self.linearisation = linearisation;
         self.is_linearised = false;
     }

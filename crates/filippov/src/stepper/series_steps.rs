@@ -153,12 +153,12 @@ impl Stepper for Taylor {
             && (system.is_analytic() || starts_clear());
         if may {
             let is_auto = at.options.method == Method::Auto;
-            self.series.jets = motion.jets(|sliding| {
+            self.series.jets = motion.jets(system, |sliding, functions| {
                 // Series on many surfaces are long: they are not even made where they are not wanted.
                 if is_auto && sliding.len() > MOST_AUTO_SERIES {
                     return None;
                 }
-                let jets = system.motion_jets(sliding, order);
+                let jets = system.motion_jets_of(sliding, functions, order);
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
             });
         }

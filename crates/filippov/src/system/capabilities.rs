@@ -93,7 +93,17 @@ impl dyn PiecewiseSystem + '_ {
 
     /// Taylor coefficients up to `order` of the motions on these surfaces; `None` if there are none.
     pub fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
-        self.taylor_series()?.motion_jets(sliding, order)
+        self.motion_jets_of(sliding, None, order)
+    }
+
+    /// The same with those of these curved switching functions, or of all.
+    pub fn motion_jets_of(
+        &self,
+        sliding: &[usize],
+        functions: Option<&[usize]>,
+        order: usize,
+    ) -> Option<Arc<MotionJets>> {
+        self.taylor_series()?.motion_jets(sliding, functions, order)
     }
 
     /// Writes the coefficients at a place: (order + 1) rows. Not finite from the order on that does not exist.

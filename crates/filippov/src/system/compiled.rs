@@ -4,8 +4,8 @@ use std::iter::once;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use filippov_expr::{
-    Backend, BinaryOp, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
-    Regions,
+    has_native_code, Backend, BinaryOp, EnclosureProgram, ExprError, Gradient, Graph, Names,
+    NodeId, Program, Regions,
 };
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -31,9 +31,10 @@ pub(super) struct Model {
     pub n_states: usize,
     pub names: Names,
     backend: Backend,
-    pub field_program: Program,
+    field_program: FieldProgram,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
+    single_rates: Vec<OnceLock<TieredProgram>>,
     affine_signs: OnceLock<AffineModel>,
     pub affine: Vec<bool>,
     /// The only switching function, if it is a state: nothing needs to be computed then.
@@ -115,8 +116,12 @@ struct LieCache {
     programs: FxHashMap<(usize, usize, u32), Arc<LieProgram>>,
 }
 
-/// Taylor coefficients of the motions met so far, by surfaces slid on and order.
-type JetsCache = FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>;
+/// Taylor coefficients of the motions met so far, by surfaces slid on, curved functions if not all of them, and order.
+type JetsCache = FxHashMap<JetsKey, Option<Arc<MotionJets>>>;
+type JetsKey = (SmallVec<[usize; 2]>, Option<SmallVec<[usize; 4]>>, usize);
+
+/// From so many on those of chosen functions are forgotten: a run meets few choices at a time.
+const MOST_JETS: usize = 64;
 
 /// Models of reduced systems, by surfaces slid on.
 type ReductionCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<Model>>>;
@@ -126,6 +131,30 @@ type JacobianCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<MotionJacobian>>
 
 /// Sets of surfaces whose derivatives are kept: a run over more of them finds some anew now and then.
 const MOST_JACOBIANS: usize = 64;
+
+/// Graphs of more nodes take so long to compile that the run begins before.
+const LARGEST_AWAITED: usize = 10_000;
+
+/// The field: every run needs it, so that it is compiled at once, unless that takes long.
+enum FieldProgram {
+    Compiled(Program),
+    Tiered(Box<TieredProgram>),
+}
+
+impl FieldProgram {
+    fn new(graph: &Graph, field: &[NodeId], backend: Backend) -> Result<Self, ExprError> {
+        if graph.len() <= LARGEST_AWAITED {
+            return Program::compile(graph, field, backend).map(FieldProgram::Compiled);
+        }
+        // Tells of what cannot be compiled.
+        Program::compile(graph, field, Backend::Interpreter)?;
+        let tiered = TieredProgram::new(graph.clone(), field.to_vec(), backend);
+        Ok(FieldProgram::Tiered(Box::new(match backend {
+            Backend::Interpreter => tiered,
+            Backend::Auto | Backend::Native => tiered.soon(),
+        })))
+    }
+}
 
 /// Output 0 is the derivative, the others its terms.
 struct LieProgram {
@@ -147,7 +176,7 @@ impl Model {
         let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
             .map(|j| graph.surface(j as u32))
             .collect();
-        let field_program = Program::compile(&graph, &field, backend)?;
+        let field_program = FieldProgram::new(&graph, &field, backend)?;
         let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
         Ok(Model {
             n_states: field.len(),
@@ -179,6 +208,7 @@ impl Model {
             relative_degrees: surfaces.iter().map(|_| OnceLock::new()).collect(),
             reductions: Mutex::default(),
             rates_program: OnceLock::new(),
+            single_rates: surfaces.iter().map(|_| OnceLock::new()).collect(),
             affine_signs: OnceLock::new(),
             field_program,
             surfaces_program,
@@ -187,6 +217,23 @@ impl Model {
             names,
             backend,
         })
+    }
+
+    /// The field.
+    #[inline(always)]
+    pub fn field_program(&self) -> &Program {
+        match &self.field_program {
+            FieldProgram::Compiled(program) => program,
+            FieldProgram::Tiered(tiered) => tiered.program(),
+        }
+    }
+
+    /// Is the field native code, or about to be?
+    pub fn is_native(&self) -> bool {
+        match &self.field_program {
+            FieldProgram::Compiled(program) => program.is_native(),
+            FieldProgram::Tiered(_) => self.backend != Backend::Interpreter && has_native_code(),
+        }
     }
 
     /// Does one of these surfaces have a higher relative degree than 1?
@@ -295,6 +342,23 @@ impl Model {
             TieredProgram::new(graph, outputs, self.backend)
         });
         rates.program()
+    }
+
+    /// The state that h_j is, if it is one.
+    pub fn as_state(&self, j: usize) -> Option<usize> {
+        self.graph.as_state(self.graph.surface(j as u32))
+    }
+
+    /// h_j, then its rate along the input vector.
+    pub fn single_rate(&self, j: usize) -> &Program {
+        let rate = self.single_rates[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let velocity: Vec<NodeId> = (0..self.n_states).map(|i| graph.input(i as u32)).collect();
+            let h = graph.surface(j as u32);
+            let outputs = vec![h, graph.directional(h, &velocity)];
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        rate.program()
     }
 
     /// Field, jumps and gradients for sliding where the field is affine in signs.
@@ -420,11 +484,25 @@ impl Model {
     }
 
     /// Taylor coefficients of the motions on these surfaces.
-    pub fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
+    pub fn motion_jets(
+        &self,
+        sliding: &[usize],
+        functions: Option<&[usize]>,
+        order: usize,
+    ) -> Option<Arc<MotionJets>> {
         let mut known = self.jets.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = known.entry((SmallVec::from_slice(sliding), order));
+        if functions.is_some() && known.len() >= MOST_JETS {
+            known.retain(|(_, functions, _), _| functions.is_none());
+        }
+        let key = (
+            SmallVec::from_slice(sliding),
+            functions.map(SmallVec::from_slice),
+            order,
+        );
+        let made = known.entry(key);
         made.or_insert_with(|| {
-            MotionJets::new(&self.graph, &self.field, sliding, order, self.backend).map(Arc::new)
+            let motion = (&self.field[..], sliding, functions);
+            MotionJets::new(&self.graph, motion, order, self.backend).map(Arc::new)
         })
         .clone()
     }

@@ -22,11 +22,11 @@ pub struct MotionJets {
 }
 
 impl MotionJets {
-    /// The coefficients up to `order`; `None` if sliding on these surfaces has none.
+    /// The coefficients up to `order` of a motion on the surfaces `sliding`, and of these curved switching functions (increasing), or of all;
+    /// `None` if sliding on these surfaces has none.
     pub(super) fn new(
         graph: &Graph,
-        field: &[NodeId],
-        sliding: &[usize],
+        (field, sliding, functions): (&[NodeId], &[usize], Option<&[usize]>),
         order: usize,
         backend: Backend,
     ) -> Option<MotionJets> {
@@ -44,7 +44,10 @@ impl MotionJets {
             }
         };
         let curved = |j: &usize| !graph.is_affine(graph.surface(*j as u32));
-        let surfaces: Vec<usize> = (0..graph.n_surfaces()).filter(curved).collect();
+        let surfaces: Vec<usize> = match functions {
+            Some(chosen) => chosen.iter().copied().filter(curved).collect(),
+            None => (0..graph.n_surfaces()).filter(curved).collect(),
+        };
         let mut functions: Vec<NodeId> =
             surfaces.iter().map(|&j| graph.surface(j as u32)).collect();
         functions.extend(&exits);

@@ -16,6 +16,7 @@ mod capabilities;
 mod clock;
 mod closures;
 mod compiled;
+mod compiler;
 mod container_sections;
 mod definition;
 mod enclosures;
@@ -118,6 +119,22 @@ pub trait PiecewiseSystem: SignStructure + Sync {
             *rate = ht + dot(&gradient, v);
         }
         Ok(())
+    }
+
+    /// h_j and its rate along the velocity `v`: the same as of [`surface_rates`](Self::surface_rates), by itself.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn surface_rate(
+        &self,
+        j: usize,
+        place: &Place<'_>,
+        v: &[f64],
+    ) -> Result<(f64, f64), FieldError> {
+        let mut h = vec![0.0; self.n_surfaces()];
+        let mut rate = h.clone();
+        self.surface_rates(place, v, &mut h, &mut rate)?;
+        Ok((h[j], rate[j]))
     }
 
     /// Writes the gradient of h_j in x and returns its derivative in t; by central differences

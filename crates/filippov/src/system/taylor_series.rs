@@ -19,9 +19,14 @@ pub trait TaylorSeries {
     /// Can fields or switching functions change although their Taylor coefficients show no change, as a late pulse does?
     fn hides_changes(&self) -> bool;
 
-    /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none; `None`
-    /// if these motions have none.
-    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>>;
+    /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none, with those of these
+    /// curved switching functions (increasing), or of all; `None` if these motions have none.
+    fn motion_jets(
+        &self,
+        sliding: &[usize],
+        functions: Option<&[usize]>,
+        order: usize,
+    ) -> Option<Arc<MotionJets>>;
 
     /// Writes the coefficients at a place: (order + 1) rows.
     fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]);

@@ -147,7 +147,7 @@ impl TracedSystem {
 
     /// Is the field native code, or interpreted?
     pub fn is_native(&self) -> bool {
-        self.model.field_program.is_native()
+        self.model.is_native()
     }
 }
 
@@ -184,7 +184,7 @@ impl TracedSystem {
     #[cold]
     #[inline(never)]
     fn field_apart(&self, place: &Place<'_>, dx: &mut [f64]) {
-        self.eval(&self.model.field_program, place, &[], dx);
+        self.eval(self.model.field_program(), place, &[], dx);
     }
 }
 
@@ -253,7 +253,7 @@ impl PiecewiseSystem for TracedSystem {
     #[inline]
     fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
         let &Place { t, x, signs, q } = place;
-        let (program, p) = (&self.model.field_program, &self.parameters);
+        let (program, p) = (self.model.field_program(), &self.parameters);
         if !(q.is_empty() && program.eval_native(t, x, signs, p, &[], dx)) {
             self.field_apart(place, dx);
         }
@@ -282,6 +282,20 @@ impl PiecewiseSystem for TracedSystem {
             self.computed_rates(place, v, h, rate);
         }
         Ok(())
+    }
+
+    fn surface_rate(
+        &self,
+        j: usize,
+        place: &Place<'_>,
+        v: &[f64],
+    ) -> Result<(f64, f64), FieldError> {
+        if let Some(i) = self.model.as_state(j) {
+            return Ok((place.x[i], v[i]));
+        }
+        let mut out = [0.0; 2];
+        self.eval(self.model.single_rate(j), place, v, &mut out);
+        Ok((out[0], out[1]))
     }
 
     fn gradient(
@@ -517,8 +531,13 @@ impl TaylorSeries for TracedSystem {
         self.model.hides_changes
     }
 
-    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
-        self.model.motion_jets(sliding, order)
+    fn motion_jets(
+        &self,
+        sliding: &[usize],
+        functions: Option<&[usize]>,
+        order: usize,
+    ) -> Option<Arc<MotionJets>> {
+        self.model.motion_jets(sliding, functions, order)
     }
 
     fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {

@@ -157,3 +157,24 @@ pub const SHARES_BEHIND_ZERO: [f64; 3] = [1e-7, 1e-5, 1e-3];
 /// Behind a touch the search goes on where a user's function is larger than its rounding by this factor: the touch is not
 /// found again.
 pub const BEHIND_TOUCH: f64 = 8.0;
+
+/// Runs of systems with fewer surfaces monitor all of them: there is little to gain.
+pub const FEWEST_ASLEEP: usize = 8;
+
+/// The box in which functions are proved to keep their signs goes beyond where the motion has been by this share of the width of
+/// that, and of the size of the state: it is left a few times in a run.
+pub const BOX_GROWTH: f64 = 1.0;
+
+/// A function keeps its sign in the box if its least value there is this share of its largest: values within rounding count as zeros.
+pub const CLEAR_IN_BOX: f64 = 1e-6;
+
+/// What a step spreads over counts this much wider: its extension is raised to a higher order by a search, and differs by the error of
+/// the step then.
+pub const SPARE_SPREAD: f64 = 1.25;
+
+/// Where a long step leads is bounded in so many pieces, if the sums of its coefficients do not tell.
+pub const PIECES_OF_RANGES: u32 = 4;
+
+/// Series of the motion contain the curved switching functions that are not asleep, if they are no more than this; else all: each
+/// set of them has a program of its own.
+pub const MOST_CHOSEN_SERIES: usize = 4;

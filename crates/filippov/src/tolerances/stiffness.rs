@@ -20,3 +20,17 @@ pub const TAYLOR_NOISE: f64 = 1e3;
 pub const STIFF_SIGNS: u32 = 15;
 /// See [`STIFF_SIGNS`].
 pub const NOT_STIFF_SIGNS: u32 = 6;
+
+/// An unknown of a linear system is coupled with very many others if its row and column together have more entries than this
+/// times the root of the number of unknowns: it alone makes the band about that wide.
+pub const COUPLED_WITH_MANY: f64 = 4.0;
+
+/// At most so many of them are kept apart: each costs one solution with the rest.
+pub const MOST_BORDERED: usize = 64;
+
+/// They are kept apart if the operations without that are this many times as many.
+pub const BORDER_GAIN: f64 = 2.0;
+
+/// A solution with a border is accurate if its residual is this part of the terms in each row: far below the tolerance of any
+/// run, and above the rounding of long sums.
+pub const BORDER_ACCURACY: f64 = 1e-11;

@@ -11,6 +11,9 @@ use crate::tolerances::ROUNDING;
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
+/// One of so many surfaces is evaluated by itself, more are evaluated with all others, for which the program is shorter.
+const FEW_OF_ALL: usize = 4;
+
 /// Scratch space of the event stage, and values of what is monitored.
 pub(crate) struct Detector {
     /// Exit functions computed in the search of this step, by theta.
@@ -68,8 +71,9 @@ impl Detector {
         (t, x, v): (f64, &[f64], &[f64]),
     ) -> Result<(), FieldError> {
         let (system, motion) = (run.system, &run.motion);
-        let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
-        if with_surfaces {
+        if motion.asleep.has_any() {
+            self.measure_awake(run, (t, x, v))?;
+        } else if motion.monitored.iter().any(|m| m.guard.is_surface()) {
             let place = motion.setting().at(t, x);
             system.surface_rates(&place, v, &mut self.h, &mut self.rate)?;
         }
@@ -79,6 +83,26 @@ impl Detector {
                 Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
                 None => (run.seen[m.place].end, f64::NAN),
             });
+        }
+        Ok(())
+    }
+
+    /// The switching functions that are monitored where others are asleep: each by itself, if they are few.
+    #[cold]
+    #[inline(never)]
+    fn measure_awake(
+        &mut self,
+        run: &Run,
+        (t, x, v): (f64, &[f64], &[f64]),
+    ) -> Result<(), FieldError> {
+        let (system, motion) = (run.system, &run.motion);
+        let place = motion.setting().at(t, x);
+        let awake = motion.monitored.iter().filter_map(Monitored::surface);
+        if FEW_OF_ALL * awake.clone().count() > self.h.len() {
+            return system.surface_rates(&place, v, &mut self.h, &mut self.rate);
+        }
+        for j in awake {
+            (self.h[j], self.rate[j]) = system.surface_rate(j, &place, v)?;
         }
         Ok(())
     }

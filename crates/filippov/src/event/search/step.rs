@@ -1,6 +1,7 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
-use smallvec::smallvec;
+use filippov_expr::Motion;
+use smallvec::{smallvec, SmallVec};
 
 use super::bounds::BoundedCurve;
 use super::detector::Detector;
@@ -11,10 +12,14 @@ use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
+use crate::event::tube::Tube;
 use crate::event::{Event, Found};
 use crate::motion::{AffineBounds, Guard, ModeField, Monitored};
 use crate::options::SlidingRule;
-use crate::tolerances::{EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
+use crate::stepper::Interpolant;
+use crate::tolerances::{
+    EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH, SPARE_SPREAD,
+};
 
 impl StepSearch<'_, '_> {
     /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
@@ -22,6 +27,9 @@ impl StepSearch<'_, '_> {
     pub(crate) fn first_event(&mut self, t1: f64, dt: f64) -> Result<(Event, f64), FieldError> {
         let mut sought = Sought::new(dt);
         self.detector.forget_step();
+        if self.run.motion.asleep.has_any() {
+            self.rouse(dt)?;
+        }
         if self.run.motion.monitored.is_empty() {
             return Ok((Event::None, sought.longest));
         }
@@ -36,6 +44,48 @@ impl StepSearch<'_, '_> {
             None => self.wrong_from_the_start()?.map_or(Event::None, Event::At),
         };
         Ok((event, sought.longest))
+    }
+
+    /// Monitors the surfaces that the step may reach, if it leaves the box in which they are asleep; all, where the field ends at its
+    /// surfaces.
+    #[cold]
+    #[inline(never)]
+    fn rouse(&mut self, dt: f64) -> Result<(), FieldError> {
+        self.stepper.extend_cheaply(&self.run.x);
+        self.measure_margin(dt)?;
+        let (step, margin) = (self.stepper.interpolant(), &self.detector.margin);
+        let (system, motion) = (self.run.system, &mut self.run.motion);
+        let is_inside = |ranges: &Ranges| motion.asleep.contains_ranges(ranges, &motion.discrete);
+        let woken = if self.one_sided {
+            motion.wake_all(system)
+        } else if is_inside(&rough_ranges(step, margin)) {
+            return Ok(());
+        } else {
+            if is_inside(&ranges(step, margin, 1)) {
+                return Ok(());
+            }
+            let ranges = ranges(step, margin, PIECES_OF_RANGES);
+            if is_inside(&ranges) {
+                return Ok(());
+            }
+            motion.wake(system, &ranges)
+        };
+        for place in woken {
+            let (j, side) = match self.run.motion.monitored[place] {
+                Monitored {
+                    guard: Guard::Surface(j),
+                    orientation,
+                    ..
+                } => (j, orientation),
+                _ => continue,
+            };
+            let at = self.run.motion.setting().at(self.run.t, &self.run.x);
+            let velocity = self.stepper.start_derivative();
+            let (value, rate) = system.surface_rate(j, &at, velocity)?;
+            let woken = &mut self.run.motion.monitored[place];
+            (woken.value, woken.rate) = (side * value, side * rate);
+        }
+        Ok(())
     }
 
     /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event,
@@ -318,4 +368,43 @@ impl StepSearch<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// Least and largest values, time first.
+type Ranges = SmallVec<[[f64; 2]; 9]>;
+
+/// Where a step leads at most: the sums of its coefficients bound its polynomials in either basis, all factors in them being at
+/// most 1.
+fn rough_ranges(step: &Interpolant, margin: &[f64]) -> Ranges {
+    let (n, rows) = (step.n_states(), step.coefficients());
+    let state = |i: usize| {
+        let moving = rows[n..].chunks_exact(n);
+        let spread: f64 = moving.map(|row| row[i].abs()).sum();
+        let spread = SPARE_SPREAD * spread + margin.get(i).copied().unwrap_or(0.0);
+        [rows[i] - spread, rows[i] + spread]
+    };
+    let time = [step.t0, step.t0 + step.dt];
+    std::iter::once(time).chain((0..n).map(state)).collect()
+}
+
+/// The same from bounds of so many pieces, with room for an extension of higher order.
+fn ranges(step: &Interpolant, margin: &[f64], n_pieces: u32) -> Ranges {
+    let length = 1.0 / f64::from(n_pieces);
+    let pieces = (0..n_pieces).map(|k| {
+        let start = f64::from(k) * length;
+        Tube::new(step, (start, start + length), margin)
+    });
+    let pieces: SmallVec<[Tube; 4]> = pieces.collect();
+    let state = |i: usize| {
+        let bounds = pieces.iter().map(|piece| piece.state(i).value);
+        let [lo, hi] = bounds.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], bound| {
+            [lo.min(bound.lo), hi.max(bound.hi)]
+        });
+        let spare = (SPARE_SPREAD - 1.0) * (hi - lo);
+        [lo - spare, hi + spare]
+    };
+    let time = [step.t0, step.t0 + step.dt];
+    std::iter::once(time)
+        .chain((0..step.n_states()).map(state))
+        .collect()
 }
