@@ -626,7 +626,7 @@ class _Side:
             jumps = distance_from(curve, w, new) > _JUMPS
             if self._turns_to(new, -direction, value, jumps):
                 return True
-            if not jumps and self._passes_to(new, direction, ds):
+            if self._passes_to(new, direction, ds):
                 return True
         # At a non-smooth fold the cycle without the leg is on this side, and ends at the same point.
         shorter = without_short_leg(curve, w)
@@ -676,7 +676,7 @@ class _Side:
         value : float
             A value behind it.
         jumps : bool, optional
-            The cycle is another one, and the branch ends at the point.
+            The cycle is far away: at a two-fold it is another one, and the branch ends.
 
         Returns
         -------
@@ -688,7 +688,8 @@ class _Side:
             self._locate_behind(back, value)
         except ModelError:
             return False
-        if jumps:
+        # At a two-fold sliding ends on the other side of the surface; elsewhere a leg only vanishes.
+        if jumps and self.special and self.special[-1].code == "TF":
             self.reason = f"behind {self.special[-1]!r} the flow jumps to another cycle"
             self.is_stopped = True
         elif self.settings.switch == "follow":
