@@ -122,12 +122,6 @@ def regularised(loop: Loop, width: float, times: Array, most: int = 400_000) -> 
     return run.y if run.success else None
 
 
-def last_time_outside(radius: float, times: Array, y: Array) -> float:
-    """Return the last of these times at which the state is outside of a ball, -1 if it never is."""
-    outside = np.abs(y).max(axis=0) > radius
-    return float(times[outside][-1]) if outside.any() else -1.0
-
-
 def check_loop(seed: int) -> tuple[str, list[str]]:
     """Run a loop; return what it comes to, and what is wrong with it."""
     loop = random_loop(seed)
