@@ -148,3 +148,59 @@ def test_a_black_box_that_returns_something_else_keeps_what_was_computed(value: 
     assert sol.error is not None
     assert message in sol.message
     assert sol.sol(0.5 * sol.t[-1]).shape == (2,)
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        (
+            lambda t, x: x[0] > 0.5,
+            "entry 0 .* returned True, which never changes its sign: .* the difference",
+        ),
+        (lambda t, x: [x[0] - 0.5], "entry 0 .* one real number, not a list: leave out the brackets"),
+        (lambda t, x: None, "entry 0 .* returned None: is a `return` missing"),
+        (lambda t: t, "entry 0 .* raised TypeError .* is called with t, x, all of args"),
+        (lambda t, x: undefined[0], "(?s)entry 0 .* raised NameError .*test_named_mistakes.py.*undefined"),  # type: ignore[name-defined] # noqa: F821
+    ],
+)
+def test_a_wrong_event_is_named_before_the_first_step(event: Any, message: str) -> None:
+    with pytest.raises(fl.InputError, match=message):
+        RELAY.solve((0, 1), [1.0], events=event)
+
+
+def test_a_truth_value_is_no_section_and_no_surface_but_a_cost() -> None:
+    with pytest.raises(fl.InputError, match=r"section: .* never changes its sign"):
+        fl.poincare(RELAY, fl.Section(lambda t, x: x[0] > 0.5), (0, 1), [1.0])
+    value, _ = fl.gradient(RELAY, (0, 1), [1.0], terminal=lambda t, y: y[0] > -1.0, wrt=["y0"])
+    assert value == 1.0
+
+
+def test_a_solution_names_the_nearest_field_and_how_to_read_a_state() -> None:
+    sol = RELAY.solve((0, 1), [1.0])
+    with pytest.raises(AttributeError, match="did you mean 'switches'"):
+        _ = sol.switch
+    with pytest.raises(AttributeError, match=r"write state\('z'\)"):
+        _ = sol.z
+    with pytest.raises(KeyError, match=r"write state\('z'\)"):
+        _ = sol["z"]
+
+
+def test_arguments_of_a_picture_that_do_not_exist_are_named() -> None:
+    pytest.importorskip("matplotlib")
+    sol = RELAY.solve((0, 1), [1.0])
+    with pytest.raises(
+        TypeError, match=r"plot\(\) .* 'figsize'; it takes ax, states, .* axes of your own as ax="
+    ):
+        sol.plot(figsize=(3, 2))
+    with pytest.raises(TypeError, match="the result of a run is needed, not ndarray"):
+        fl.plot.phase(sol.y)
+
+
+def test_misspelled_names_have_suggestions() -> None:
+    for call, kind, message in (
+        (lambda: RELAY.ensemble((0, 1), [[1.0]], thread=2), TypeError, r"ensemble\(\) .* 'threads'"),
+        (lambda: fl.limit_cycle(RELAY, [1.0], peroid=1.0), fl.InputError, "did you mean 'period'"),
+        (lambda: fl.problems.get("dryfriction"), KeyError, "did you mean 'dry_friction'"),
+    ):
+        with pytest.raises(kind, match=message):
+            call()

@@ -364,7 +364,7 @@ def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
     known = set(inspect.signature(solve_ivp).parameters) - {"unknown"}
     unknown = {name: value for name, value in options.items() if name not in known}
     system.refuse_undeclared(unknown)
-    check_unknown(unknown, solve_ivp, system.params)
+    check_unknown(unknown, type(system).ensemble, system.params, solve_ivp)
     return {name: value for name, value in options.items() if name in OPTIONS}
 
 

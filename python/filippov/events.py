@@ -193,16 +193,43 @@ def default_parameters(function: Callable[..., Any], n_given: int = 0) -> dict[s
     }
 
 
-def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
-    """Call `g` once at the start and refuse what is not a single real number."""
+def check_scalar_function(
+    g: Callable[[float, Any], Any], t0: float, y0: Any, what: str, *, changes_sign: bool = True
+) -> None:
+    """Call `g` once at the start and refuse what is not a single real number.
+
+    A function whose zeros are searched (`changes_sign`) may not return a truth value: it is never negative.
+    """
     try:
-        value = np.asarray(g(t0, y0.copy()))
+        returned = g(t0, y0.copy())
+        value = np.asarray(returned)
     except Exception as error:
-        raise InputError(f"{what} raised {type(error).__name__} at the start: {error}") from error
+        raise InputError(f"{what} {_failure(error)}") from error
+    if returned is None:
+        raise InputError(f"{what} returned None: is a `return` missing?")
+    if isinstance(returned, (list, tuple)):
+        kind = type(returned).__name__
+        raise InputError(f"{what} must return one real number, not a {kind}: leave out the brackets")
     if value.size != 1 or value.dtype.kind not in "fiub":
         raise InputError(
             f"{what} must return one real number, it returned {value.dtype.name} of shape {value.shape}"
         )
+    if changes_sign and value.dtype.kind == "b":
+        raise InputError(
+            f"{what} returned {bool(value)}, which never changes its sign: "
+            "in place of a comparison `a > b` return the difference `a - b`"
+        )
+
+
+def _failure(error: Exception) -> str:
+    """Return what a function raised at the start, its line, and how it is called if that was the reason."""
+    from filippov.trace.explain import deepest_user_line  # only needed for a message
+
+    line = deepest_user_line(error.__traceback__)
+    text = f"raised {type(error).__name__} at the start: {error}"
+    if isinstance(error, TypeError) and line is None:
+        return f"{text}; it is called with t, x, all of args, and the parameters that it names"
+    return text if line is None else f"{text}\n{line}"
 
 
 def function_name(function: Any, default: str) -> str:

@@ -122,7 +122,8 @@ def gradient(
     costs = [("terminal", terminal), ("running", running), *((part.name, part.cost) for part in parts)]
     for name, cost in costs:
         if cost is not None:
-            check_scalar_function(bind_function(cost, (), values), t0, start, name)
+            bound = bind_function(cost, (), values)
+            check_scalar_function(bound, t0, start, name, changes_sign=False)
 
     followed, final = system, terminal
     if running is not None:

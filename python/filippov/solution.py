@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
@@ -34,6 +35,7 @@ from filippov.switches import (
     symmetric,
 )
 from filippov.trace.tracer import trace_output
+from filippov.unknown import did_you_mean
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -517,7 +519,15 @@ class Solution:
         return {name: np.full(len(self.t), values[name]) for name in names}
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"{name!r}; the fields are {', '.join(_FIELDS)}")
+        if name.startswith("_"):
+            raise AttributeError(name)
+        public = [known for known in dir(type(self)) if not known.startswith("_")]
+        hint = self._hint_of_state(name) or did_you_mean(name, dict.fromkeys([*_FIELDS, *public]))
+        raise AttributeError(f"{name!r}{hint}; the fields are {', '.join(_FIELDS)}")
+
+    def _hint_of_state(self, name: object) -> str:
+        """Return how to read a state of that name; empty if there is none."""
+        return f"; write state({name!r}) for the state" if name in self.__dict__.get("states", ()) else ""
 
     def _fields(self) -> dict[str, Any]:
         """Return all fields by name, in their order, those made now that were not asked for yet."""
@@ -538,7 +548,8 @@ class Solution:
         try:
             return self._fields()[key]
         except KeyError:
-            raise KeyError(f"{key!r}; the fields are {', '.join(self)}") from None
+            hint = self._hint_of_state(key)
+            raise KeyError(f"{key!r}{hint}; the fields are {', '.join(self)}") from None
 
     def __contains__(self, key: object) -> bool:
         return key in self._fields()
@@ -886,6 +897,14 @@ class Solution:
         """
         from filippov.plot import time_series
 
+        known = inspect.signature(time_series).parameters
+        for name in options:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                raise TypeError(
+                    f"plot() got an unexpected keyword argument {name!r}{hint}; it takes "
+                    f"{', '.join(list(known)[1:])}; for a size or a title, give axes of your own as ax="
+                )
         return time_series(self, ax=ax, states=states, dark=dark, **options)
 
     def __repr__(self) -> str:

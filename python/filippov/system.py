@@ -470,10 +470,14 @@ class System(Points, Saving):
         changes = check_params(given) if given is not None else {}
         for name in changes:
             if name not in self._params:
-                known = f"the parameters are {', '.join(self._params)}" if self._params else "it has none"
-                hint = self._how_to_declare(name) or did_you_mean(name, self._params)
-                raise InputError(f"params: the system has no parameter {name!r}{hint}; {known}")
+                raise InputError(f"params: {self.no_parameter(name)}")
         return {**self._params, **changes}
+
+    def no_parameter(self, name: str) -> str:
+        """Return the message for a parameter that the system does not have."""
+        known = f"the parameters are {', '.join(self._params)}" if self._params else "it has none"
+        hint = self._how_to_declare(name) or did_you_mean(name, self._params)
+        return f"the system has no parameter {name!r}{hint}; {known}"
 
     def line_not_finite(self, run: Run, values: Mapping[str, float]) -> str:
         """Return the line of the function in which a number becomes infinite or NaN at the end of a run.

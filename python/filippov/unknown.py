@@ -21,15 +21,22 @@ _FORMER = {
 
 
 def check_unknown(
-    unknown: Mapping[str, Any], function: Callable[..., Any], parameters: Iterable[str] = ()
+    unknown: Mapping[str, Any],
+    function: Callable[..., Any],
+    parameters: Iterable[str] = (),
+    *others: Callable[..., Any],
 ) -> None:
-    """Refuse unknown keywords with a suggestion; a system takes `parameters` too. SciPy's own are ignored."""
+    """Refuse unknown keywords of `function` with a suggestion. SciPy's own are ignored.
+
+    A system takes `parameters` too; `others` are functions that the keywords are handed on to.
+    """
     refuse_former(unknown, function, parameters)
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
             continue
         if name not in _SCIPY_ONLY:
-            known = [*parameters, *inspect.signature(function).parameters]
+            takers = (function, *others)
+            known = [*parameters, *(key for one in takers for key in inspect.signature(one).parameters)]
             hint = did_you_mean(name, known)
             of_system = f"; the parameters of the system are {', '.join(parameters)}" if parameters else ""
             what = f"{function.__name__}() got an unexpected keyword argument {name!r}"

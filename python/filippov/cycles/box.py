@@ -66,7 +66,8 @@ class Equilibria(Sequence[Equilibrium]):
 
     def __repr__(self) -> str:
         words = "proved to be all" if self.certified else "there may be others"
-        return "\n".join([f"{len(self)} equilibria, {words}", *map(repr, self._found)])
+        kind = "equilibrium" if len(self) == 1 else "equilibria"
+        return "\n".join([f"{len(self)} {kind}, {words}", *map(repr, self._found)])
 
 
 def equilibria(

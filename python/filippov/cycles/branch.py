@@ -336,7 +336,8 @@ class Branch:
             f"{name} from {np.min(self.values(name)):.6g} to {np.max(self.values(name)):.6g}"
             for name in self.names
         )
-        return f"Branch({len(self)} {what}, {ranges}; {len(self.special)} special points; {self.reason})"
+        n = len(self.special)
+        return f"Branch({len(self)} {what}, {ranges}; {n} special point{'s' * (n != 1)}; {self.reason})"
 
 
 def _start(state: State) -> Any:

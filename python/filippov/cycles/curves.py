@@ -23,7 +23,6 @@ from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import positive
-from filippov.unknown import did_you_mean
 
 __all__ = ["OnCurve", "curve_in_two"]
 
@@ -158,7 +157,7 @@ def curve_in_two(
     params = start.state.params
     for name in names:
         if name not in params or name in start.state.system.discrete:
-            raise InputError(f"parameter: the system has no parameter {name!r}{did_you_mean(name, params)}")
+            raise InputError(f"parameter: {start.state.system.no_parameter(name)}")
     if not isinstance(bounds, Mapping) or set(bounds) != set(names):
         raise InputError(
             f"bounds: a dict with the ranges of {names[0]} and {names[1]} is needed, not {bounds!r}"

@@ -30,7 +30,6 @@ from filippov.notices import show_warnings
 from filippov.options import check_time, check_y0
 from filippov.solution import Solution
 from filippov.system import System
-from filippov.unknown import did_you_mean
 
 __all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "in_parts", "limit_cycle", "turns_of"]
 
@@ -230,7 +229,7 @@ class Cycle:
             If the cycle is not isolated.
         """
         if name not in self.params or name in self.system.discrete:
-            raise InputError(f"name: the system has no parameter {name!r}{did_you_mean(name, self.params)}")
+            raise InputError(f"name: {self.system.no_parameter(name)}")
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian

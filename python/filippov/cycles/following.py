@@ -34,7 +34,6 @@ from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import count, positive
-from filippov.unknown import did_you_mean
 
 __all__ = ["at_value", "continuation"]
 
@@ -197,7 +196,7 @@ def _checked(
     progress: Any,
 ) -> _Settings:
     if name not in start.params or name in start.system.discrete:
-        raise InputError(f"parameter: the system has no parameter {name!r}{did_you_mean(name, start.params)}")
+        raise InputError(f"parameter: {start.system.no_parameter(name)}")
     low, high = bounds_of(bounds, name)
     value = start.params[name]
     if not low <= value <= high:

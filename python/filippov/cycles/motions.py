@@ -37,6 +37,8 @@ _NOT_HERE = (
     *("fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"),
     *("t_eval", "dense_output", "keep", "wrt", "order", "nonunique", "progress"),
 )
+# Arguments of the functions that hand their options over: what was misspelled may be one of these.
+_OF_CALLERS = ("params", "t0", "section", "period", "itinerary", "transient", "mode", "progress")
 
 
 class LegEnd(NamedTuple):
@@ -329,7 +331,8 @@ def _check_names(options: Mapping[str, Any]) -> None:
     known = [name for name in inspect.signature(solve_ivp).parameters if name not in _NOT_HERE]
     for name in options:
         if name not in known:
-            raise InputError(f"{name}: it is not an option here{did_you_mean(name, known)}")
+            hint = did_you_mean(name, [*known, *_OF_CALLERS])
+            raise InputError(f"{name}: it is not an option here{hint}")
 
 
 def _contiguous(x: Array) -> Array:

@@ -197,9 +197,13 @@ def curves_of(solution: Solution, wanted: Any) -> Curves:
 
     Raises
     ------
+    TypeError
+        If `solution` is no solution.
     ValueError
         If there is none of that name or number.
     """
+    if not isinstance(solution, Solution):
+        raise TypeError(f"solution: the result of a run is needed, not {type(solution).__name__}")
     names, outputs = list(solution.states), [*solution.discrete, *solution.output_names]
     if wanted is None:
         return Curves(tuple(range(len(names))), tuple(names))

@@ -20,6 +20,7 @@ from filippov.problems import (
     welander,
 )
 from filippov.problems.problem import Problem
+from filippov.unknown import did_you_mean
 
 __all__ = ["get", "names"]
 
@@ -65,4 +66,5 @@ def get(name: str) -> Problem:
     try:
         return _PROBLEMS[name]
     except KeyError:
-        raise KeyError(f"no problem {name!r}; the names are {', '.join(names())}") from None
+        hint = did_you_mean(name, names()) or f"; the names are {', '.join(names())}"
+        raise KeyError(f"no problem {name!r}{hint}") from None
