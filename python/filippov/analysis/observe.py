@@ -64,8 +64,8 @@ def span_of(t_span: Any, section: Any, has_count: bool) -> tuple[float, float]:
         return t0, t1
     if not (isinstance(section, Phase) and section.of is None and has_count):
         raise InputError(
-            "t_span: the end may be infinite only for the section Phase(period) with a number of returns n; "
-            "a run that never came back to another section would not end"
+            "t_span: the end may be infinite only for the section Phase(period) with a number of returns n, "
+            "because a run may never come back to another section; give a finite end, as (0, 500)"
         )
     return check_t_span((t0, 0.0))[0], math.inf
 
