@@ -38,6 +38,6 @@ def front(folder: Path | None = None) -> Path:
 
 
 def engine_bytes(folder: Path | None = None) -> bytes:
-    """Return the core as WebAssembly; nothing if it was not built: then the kernel answers."""
+    """Return the core as WebAssembly; empty if it was not built, and then the kernel computes."""
     path = (folder or static_folder()) / ENGINE
     return path.read_bytes() if path.is_file() else b""

@@ -79,7 +79,7 @@ class Page(NamedTuple):
         return self.system.prepare(len(self.y0), self.t_span[0], np.array(self.y0), self.params)
 
     def why_it_stays(self) -> str:
-        """Return why the system needs Python for its runs; empty if its bytes are all that they need."""
+        """Return why runs of the system need Python; empty if the page can compute them itself."""
         prepared = self.prepared()
         if not isinstance(prepared.core, TracedSystem):
             return "its function could not be traced, and is called as a Python function"
@@ -91,7 +91,7 @@ class Page(NamedTuple):
         return ""
 
     def section(self) -> str:
-        """Return all but the system as JSON, as the container holds it."""
+        """Return everything except the system as JSON, for the container."""
         fields = {
             "title": self.title,
             "y0": self.y0,
@@ -171,7 +171,7 @@ def make_page(
     axes: Sequence[int | str] | None = None,
     text: str | None = None,
 ) -> Page:
-    """Return a system with what a page shows it with.
+    """Return a `Page`: a system with its start, interval, slider ranges and title.
 
     Parameters
     ----------

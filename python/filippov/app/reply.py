@@ -51,7 +51,7 @@ class Reply(NamedTuple):
 
 
 def failure(error: str, code: str) -> bytes:
-    """Return the reply that says why there is none."""
+    """Return a reply that carries an error message."""
     return Reply({"ok": False, "error": error, "code": code}, {}).to_bytes()
 
 

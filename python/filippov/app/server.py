@@ -139,7 +139,7 @@ class _Http(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a browser that has gone away; show everything else."""
+        """Ignore a connection that the browser closed; print every other error."""
         if not isinstance(sys.exc_info()[1], ConnectionError):
             super().handle_error(request, client_address)
 
@@ -156,7 +156,7 @@ def _refused(status: HTTPStatus, sentence: str) -> _Answer:
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    """Return the files that are given out, by their paths in addresses."""
+    """Return the served files by the path in their address."""
     found = {f"/{path.name}": path for path in folder.iterdir() if path.is_file() and path.suffix in _KINDS}
     if "/index.html" in found:
         found["/"] = found["/index.html"]
@@ -240,7 +240,7 @@ class _Handler(BaseHTTPRequestHandler):
         return int(text) if text.isascii() and text.isdigit() and len(text) < 16 else None
 
     def _refusal(self) -> _Answer | None:
-        """Return what a request is refused with that comes from elsewhere, whatever it asks for."""
+        """Return the refusal of a request that does not come from this computer's page; None if it does."""
         hosts = self.owner.hosts
         host = self.headers.get_all("Host") or []
         if len(host) != 1 or host[0] not in hosts:

@@ -25,7 +25,7 @@ class Curve(Protocol):
     Attributes
     ----------
     is_exact : bool
-        Are their derivatives exact, and not differences?
+        Whether the derivatives are exact, not finite differences.
     """
 
     is_exact: bool

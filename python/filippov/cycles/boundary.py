@@ -68,7 +68,7 @@ def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...
 def _admissible_along(
     curve: EquilibriumCurve, point: Step, bounds: tuple[float, float]
 ) -> tuple[Equilibrium, float] | None:
-    """Return the nearest equilibrium of a branch that the system has, and in which direction it lies."""
+    """Return the nearest admissible equilibrium of a branch, and the direction to it."""
     scale = curve.scales(point.w)
     tangent = tangent_of(point.jacobian, scale)
     for sign in (1.0, -1.0):

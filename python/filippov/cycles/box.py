@@ -207,7 +207,7 @@ class _Search(NamedTuple):
         return self._is_on_its_sides(point, [j for j, is_active in enumerate(active) if not is_active])
 
     def _is_on_its_sides(self, point: Equilibrium, surfaces: Sequence[int]) -> bool:
-        """Whether it is where its mode is; of modes with the same field there, one is."""
+        """Whether an equilibrium lies in its mode; of several modes with the same field, one counts."""
         mode = point.mode
         signs = np.array([1.0 if entry == 0 else float(entry) for entry in mode])
         h = self.motions.right_hand_side(0.0, point.y, signs)[self.n :]
@@ -391,7 +391,7 @@ class _Proof:
 
 
 def _by_starts(search: _Search, modes: Sequence[tuple[int, ...]]) -> list[Equilibrium]:
-    """Return the equilibria to which Newton's method comes from many points."""
+    """Return the equilibria that Newton's method finds from many starting points."""
     random = np.random.default_rng(0)
     starts = search.low + random.uniform(size=(_STARTS, search.n)) * (search.high - search.low)
     starts[0] = 0.5 * (search.low + search.high)
@@ -412,7 +412,7 @@ def _by_starts(search: _Search, modes: Sequence[tuple[int, ...]]) -> list[Equili
 
 
 def _modes_at(search: _Search, starts: Array) -> list[tuple[int, ...]]:
-    """Return the regions in which points are, and these modes with a zero for one or two entries."""
+    """Return the regions of some points, and the sliding modes on one or two surfaces beside them."""
     ones = np.ones(search.core.n_surfaces)
     found: dict[tuple[int, ...], None] = {}
     for x in starts:

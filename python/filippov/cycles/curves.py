@@ -57,7 +57,10 @@ class _ProbeCondition:
         self._share = (at - place[n]) / place[n + 1]
 
     def _local(self, v: Array) -> tuple[float, float, float]:
-        """Return test function, next derivative and share of its leg, from where and how long that is."""
+        """Return the test function, its next derivative, and its place as a fraction of the leg.
+
+        `v` has the start of the leg, its duration and the parameters.
+        """
         n = self.curve.shooting.n
         self.curve.shooting.motions.move(v[n + 2 :])
         return local_probe(self.curve.shooting, self.key, v[:n], float(v[n]), float(v[n + 1]), self._share)

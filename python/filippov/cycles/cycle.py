@@ -280,7 +280,7 @@ def _rank(matrix: Array) -> int:
 
 
 def multipliers_of(shot: Shot, is_forced: bool, n_zero: int = 0) -> npt.NDArray[np.complex128]:
-    """Return the multipliers, the largest first, of which the smallest are zero; without forcing one is 1."""
+    """Return the multipliers, largest first: exact zeros last, and exactly 1 once without forcing."""
     across = None if is_forced else shot.across()
     own = shot.monodromy() if across is None else across
     found = np.linalg.eigvals(own).astype(np.complex128)
@@ -293,7 +293,7 @@ def multipliers_of(shot: Shot, is_forced: bool, n_zero: int = 0) -> npt.NDArray[
 
 
 def _codimension(motions: Motions, leg: Leg) -> int:
-    """Return how many dimensions a leg has lost."""
+    """Return the number of dimensions that the state has lost in a leg, by sliding and contact."""
     slid = sum(entry == 0 for entry in leg.mode)
     forces = sum(kind == "force" for kind, *_ in motions.guards(leg.mode, leg.discrete))
     return slid + forces
@@ -318,7 +318,7 @@ def _slopes_of(
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
-    """Whether its pieces end as they should, and a run from within a cycle makes them."""
+    """Whether the pieces end as the itinerary demands, and a run from inside the cycle has these pieces."""
     if any(probe.value < -_ROUNDING for probe in end_probes_of(cycle._shooting, cycle._shot)):
         return False
     if len(cycle._parts.legs) > len(cycle.itinerary.legs):  # a run would leave it
@@ -513,7 +513,7 @@ def in_parts(cycle: Cycle) -> Cycle | None:
 
 
 def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
-    """Refuse a cycle whose discrete states are samples of its state: they are no constants of its pieces."""
+    """Refuse a cycle with discrete states that are samples of the state: they change from piece to piece."""
     for i, passage in enumerate(shot.passages[:-1]):
         held = np.array(shooting.legs[i + 1].discrete)
         if held.size and np.max(np.abs(held - passage.discrete)) > 1e-9 * (1 + np.max(np.abs(held))):
@@ -579,7 +579,7 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
 
 
 def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]:
-    """Return a span of time in which much happens, with the run over it."""
+    """Return a time span of many steps or switches, and the run over it."""
     span = 1.0
     while True:
         solution = motions.run((t0, t0 + span), x)
@@ -591,7 +591,7 @@ def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]
 
 
 def _ticks(motions: Motions, t0: float, x: Array, span: float) -> float | None:
-    """Return the period of what happens at known times, if anything does."""
+    """Return the period of the known times of clocks and resets; None if there are none."""
     record = motions.record((t0, t0 + span), x)
     times = np.unique(
         [instant.times[0] for instant in record.instants if not instant.guards and instant.acts]
@@ -707,7 +707,7 @@ def _first_event(run: Solution) -> tuple[Array, Array]:
 
 
 def _last_inside(run: Solution) -> tuple[float, Array]:
-    """Return the last place of a run in the middle of a piece that slides on few surfaces."""
+    """Return the middle of the last piece of a run that slides on few surfaces."""
     assert run.sol is not None
     t_end, span = float(run.t[-1]), float(run.t[-1] - run.t[0])
     pieces = [
@@ -779,7 +779,7 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
 
 
 def _counts_time(itinerary: Itinerary) -> bool:
-    """Whether clocks tick in a cycle, whose counts belong to a time."""
+    """Whether clocks tick in the cycle: their counts fix its start in time."""
     endings = (leg.ending for leg in itinerary.legs)
     return any(leg.discrete for leg in itinerary.legs) or any(
         e is not None and e.guard is None for e in endings

@@ -391,7 +391,7 @@ class _Side:
         return True
 
     def _vanishes(self) -> bool:
-        """Whether a cycle without switches has shrunk to an equilibrium, and would grow again inside out."""
+        """Whether a cycle without switches has shrunk to an equilibrium, where its branch ends."""
         spans = []
         for point in self.points[-2:]:
             state = point.state
@@ -501,13 +501,13 @@ class _Side:
         return True
 
     def _finer(self, position: _Position, cycle: Cycle) -> _Position:
-        """Return the position of a cycle in more parts, with the direction of one in fewer."""
+        """Return the position of a cycle divided into more parts, in the same direction along the branch."""
         finer = self._position(cycle, 1.0)
         ways = [_summary(place.curve, place.w, place.tangent) for place in (position, finer)]
         return finer if ways[0] @ ways[1] > 0 else finer.turned()
 
     def _is_single_again(self, following: _Position) -> bool:
-        """Whether a cycle of two alike halves has become one that is followed twice: behind it they swap."""
+        """Whether a doubled cycle has become a single one followed twice: its halves swap behind it."""
         curve = self.here.curve
         if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
             return False
@@ -584,7 +584,7 @@ class _Side:
         self.special.append(Special(code, kind, surface, t, params, len(self.points) - 1, state, key))
 
     def _change(self, key: Any, located: Step, beyond: Array) -> bool:
-        """Go on with the itinerary of the flow behind a special point. False: the branch ends."""
+        """Continue with the itinerary that the flow takes behind a special point. False: the branch ends."""
         curve = self.here.curve
         direction = float(np.sign(beyond[-1] - located.w[-1])) or self.direction
         following: tuple[State, float] | None = None
@@ -602,7 +602,7 @@ class _Side:
         return True
 
     def _leg_vanishes_within(self, ds: float) -> bool:
-        """Whether a leg that is short already would have no duration after a step."""
+        """Whether the next step would make the duration of a short leg zero or negative."""
         curve, w, tangent, _ = self.here
         if not isinstance(curve, CycleCurve):
             return False
@@ -725,7 +725,7 @@ class _Side:
 
 
 def _summary(curve: AnyCurve, w: Array, tangent: Array) -> Array:
-    """Return what a direction does to the first state, the period and the parameter of a cycle."""
+    """Return the rates of the first state, the period and the parameter along a direction."""
     assert isinstance(curve, CycleCurve)
     n, m = curve.shooting.n, curve.shooting.m
     return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])

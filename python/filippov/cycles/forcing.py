@@ -30,7 +30,7 @@ _GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 @lru_cache(maxsize=16)
 def _places(n: int, m: int) -> list[tuple[float, Array, Array]]:
-    """Return places for looking at a right-hand side: times in units of one, states, signs."""
+    """Return times (as multiples of a unit), states and signs at which to evaluate a right-hand side."""
     random = np.random.default_rng(20)
     return [
         (random.uniform(0.0, 1.0), random.uniform(-1.0, 1.0, n), random.choice([-1.0, 1.0], m))
@@ -194,7 +194,7 @@ def _slope(function: Callable[[float], Array], d: float) -> Array:
 
 
 def _difference(motions: Motions, period: float, count: int = _PLACES) -> Array:
-    """Return by how much field and switching functions differ a period later, at some places."""
+    """Return the differences of field and switching functions over one period, at several places."""
     parts = []
     for u, x, signs in _samples(motions)[:count]:
         t = u * period
@@ -248,7 +248,7 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
 
 
 def _first_dip(motions: Motions, step: float, longest: float) -> float | None:
-    """Return the first time after which the right-hand side is the same, among multiples of a step."""
+    """Return the first multiple of a step that is a period of the right-hand side."""
     size = _size(motions)
     before = [np.inf, np.inf]
     for k in range(4, int(longest / step) + 1):

@@ -108,7 +108,7 @@ class Itinerary(NamedTuple):
         return self.legs[-1].ending is not None
 
     def merged(self) -> Itinerary:
-        """Return the same cycle with all that is divided in one leg."""
+        """Return the same cycle with divided legs joined again."""
         legs: list[Leg] = []
         starts: list[Array] = []
         durations: list[float] = []
@@ -214,7 +214,7 @@ def _place_in(record: Record, earlier: Sequence[Instant], t: float) -> Instant:
 
 
 def _nearest(instants: Sequence[Instant], instant: Instant, t: float) -> int | None:
-    """Return the place of the instant of the same kind that is nearest to a time, if one is near."""
+    """Return the index of the nearest instant of the same kind to the time `t`; None if none is near."""
     alike = [
         k
         for k, other in enumerate(instants)

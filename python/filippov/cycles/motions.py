@@ -217,7 +217,7 @@ class Motions:
         self._params, self._held = moved, None
 
     def copy(self) -> Motions:
-        """Return the same motions, to be moved on their own."""
+        """Return a copy with its own parameters."""
         other = Motions.__new__(Motions)
         other.__dict__.update(self.__dict__)
         return other
@@ -321,7 +321,7 @@ class Motions:
 
 
 def _check_names(options: Mapping[str, Any]) -> None:
-    """Refuse what is no option of the runs of an analysis.
+    """Refuse an unknown option of the runs.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def back_from_change(curve: CycleCurve, key: Any, located: Step) -> tuple[Cycle,
 
 
 def _from_event(cycle: Cycle) -> Cycle:
-    """Return a cycle from a switch, if a run can tell where that is."""
+    """Return the cycle with its start at a switch, if a run finds one."""
     try:
         return cycle.from_event()
     except ModelError:
@@ -267,7 +267,7 @@ def _with_touch(curve: CycleCurve, key: Any, w: Array) -> Iterator[Itinerary]:
 
 
 def _replaced(itinerary: Itinerary, i: int, rows: list[tuple[Leg, Array, float]]) -> Itinerary:
-    """Return an itinerary with other legs in place of one."""
+    """Return the itinerary with one leg replaced by others."""
     legs, starts, durations = zip(*rows, strict=True)
     return Itinerary(
         (*itinerary.legs[:i], *legs, *itinerary.legs[i + 1 :]),

@@ -67,7 +67,7 @@ class Probe(NamedTuple):
 
 
 def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
-    """Return the test functions of a cycle; the shot has the guards along the way."""
+    """Return the test functions of a cycle; `shot` holds the guards along each leg."""
     found: list[Probe] = []
     starts, _, t = shooting.parts(u)
     for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
@@ -151,7 +151,7 @@ def _triggers(motions: Motions, surface: int) -> bool:
 
 
 def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage) -> list[Probe]:
-    """Return what must hold where a leg ends."""
+    """Return the conditions at the end of a leg."""
     assert leg.ending is not None
     assert leg.ending.guard is not None
     guard, t = leg.ending.guard, passage.t
@@ -199,7 +199,7 @@ def _is_crossed(before: Mode, after: Mode, surface: int) -> bool:
 def local_probe(
     shooting: Shooting, key: tuple[Any, ...], x: Array, t0: float, duration: float, share: float
 ) -> tuple[float, float, float]:
-    """Return one test function from the start of its leg alone, and the next derivative of what vanishes.
+    """Return one test function and its next derivative, computed from the start of its leg alone.
 
     Parameters
     ----------

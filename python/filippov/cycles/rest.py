@@ -347,7 +347,7 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
 
 
 def _mode_of(motions: Motions, x: Array, mode: Any) -> tuple[int, ...]:
-    """Return the entries of a mode, those of surfaces without an entry in it as at the point."""
+    """Return the entries of a mode; surfaces that it does not name have their side at the point."""
     record = motions.record((0.0, 1e-9), x)
     own = record.mode
     if record.instants and record.instants[0].times[0] == 0.0:

@@ -55,7 +55,7 @@ class ReturnMap:
             self.passages = max(1, int(np.count_nonzero(later < 1.001 * self.period)))
 
     def unstable(self) -> tuple[float, Array]:
-        """Return the multiplier outside of the unit circle, and its eigenvector, in the section."""
+        """Return the unstable multiplier (modulus above 1) and its eigenvector in the section."""
         values, vectors = np.linalg.eig(self.cycle.monodromy)
         k = int(np.argmax(np.abs(values)))
         if abs(values[k].imag) > 1e-9 * abs(values[k]):

@@ -167,7 +167,7 @@ class Shooting:
 
     @cached_property
     def swing(self) -> Array:
-        """How far the states are from the starts of their legs on the way, (n,), in the first guess."""
+        """The largest change of each state from the start to the middle of a leg, shape (n,), in the guess."""
         t, found = self._guess.t0, np.zeros(self.n)
         for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
             middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration).x
@@ -307,7 +307,7 @@ class Shooting:
 
 
 def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] | None:
-    """Return the equations with those legs divided along which perturbations grow much; nothing if none is.
+    """Return the equations with every leg of large growth divided; None if there is none.
 
     In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
     """
@@ -415,7 +415,7 @@ def _newton_step(jacobian: Array, residual: Array, scale: Array) -> tuple[Array,
 
 
 def _shorter(shooting: Shooting, u: Array, change: Array) -> float:
-    """Return the share of a step that leaves all durations positive."""
+    """Return the largest fraction of a Newton step that keeps all durations positive."""
     n, m = shooting.n, shooting.m
     durations, changes = u[m * n : m * (n + 1)], change[m * n : m * (n + 1)]
     shrinking = changes < 0

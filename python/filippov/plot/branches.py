@@ -143,7 +143,7 @@ def _kinds(branch: Branch) -> list[str]:
 
 
 def _parts(branch: Branch, x: str, y: str) -> Iterator[_Part]:
-    """Yield runs of one kind; they change at special points, which are put between the points."""
+    """Yield the parts of a branch with one kind each; special points are the ends of parts."""
     own_x, own_y, kinds = branch.values(x), branch.values(y), _kinds(branch)
     rows: list[tuple[float, float, float, str | None]] = [
         (float(k), own_x[k], own_y[k], kinds[k]) for k in range(len(branch))
@@ -173,7 +173,7 @@ def _parts(branch: Branch, x: str, y: str) -> Iterator[_Part]:
 
 
 def _jumps(points: Array, is_special: Sequence[bool]) -> npt.NDArray[np.bool_]:
-    """Return between which neighbours a quantity jumps, shape (k - 1,).
+    """Return where a quantity jumps between neighbouring points, a mask of shape (k - 1,).
 
     Behind a sliding bifurcation a cycle may start at another switch: its start is not continuous there.
     A heuristic: the quantity changes much and the parameter hardly, beside a special point.
@@ -185,7 +185,7 @@ def _jumps(points: Array, is_special: Sequence[bool]) -> npt.NDArray[np.bool_]:
 
 
 def _kind_of(before: str | None, after: str | None, latest: str) -> str:
-    """Return the kind of a piece between two points, of which those without a kind are special."""
+    """Return the kind of the piece between two points; a special point has none of its own."""
     return before or after or latest
 
 

@@ -107,7 +107,7 @@ def _draw_square(ax: Any, chosen: Theme) -> None:
 
 
 def _draw_arrows(ax: Any, hidden: HiddenDynamics, chosen: Theme) -> None:
-    """Draw directions only: the lengths say little, and differ by orders of magnitude."""
+    """Draw arrows of equal length: the speeds differ by orders of magnitude."""
     places = np.linspace(-1.25, 1.25, _ARROWS)
     u, v = np.meshgrid(places, places)
     g1, g2 = hidden.rates(u, v)

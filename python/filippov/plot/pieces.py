@@ -1,4 +1,4 @@
-"""What is drawn of a solution: points of all of its segments, and which states and outputs."""
+"""The curves to draw of a solution: points of all segments, for chosen states and outputs."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Track:
         return refined(knots, self._at, lambda t, x: self.rows(t, x) / size[:, :, None], _COARSE)
 
     def _knots(self) -> Polyline:
-        """Return the ends of all pieces, and some points in every step."""
+        """Return the points at the ends of all pieces, and some points in every step."""
         steps, pieces = self._steps()
         inner = np.diff(pieces) == 0
         shares = np.arange(_PARTS_OF_A_STEP) / _PARTS_OF_A_STEP
@@ -168,7 +168,7 @@ class Curves(NamedTuple):
         return np.array(rows).reshape(len(rows), len(times))
 
     def kept(self, solution: Solution, inside: Any) -> Array:
-        """Return the values at those of the times of the solution that are inside."""
+        """Return the values at the times of the solution that lie inside."""
         named = {**solution.discrete, **solution.outputs}
         rows = [solution.y[place] if isinstance(place, int) else named[place] for place in self.places]
         return np.array([row[inside] for row in rows]).reshape(len(rows), -1)

@@ -110,12 +110,12 @@ _PRINT = {
 def style(dark: bool = False, **changes: Any) -> Iterator[Theme]:
     """Draw everything inside a ``with`` block on a light or on a dark ground, ready for print.
 
-    Also a decorator of a function that draws. What you draw yourself has the same colours and frames.
+    It can also decorate a function that draws. Your own drawing in the block has the same colours and frames.
 
     Parameters
     ----------
     dark : bool, optional
-        Light lines on a dark ground; the default of all functions here within the block.
+        Light lines on a dark ground, for all pictures in the block.
     **changes
         Other settings of Matplotlib, with ``_`` for ``.`` in their names: ``font_size=11``.
 

@@ -101,7 +101,7 @@ def _draw_curve(ax: Any, sheet: Any, kinds: Any, chosen: Theme) -> None:
 
 
 def _of_corners(kinds: Any) -> str:
-    """Return the kind of a piece between points: a tangency or a corner belongs to what is beside it."""
+    """Return the kind of a piece; its ends at tangencies and corners do not count."""
     parts = [str(kind) for kind in kinds.flat if kind not in ("tangency", "intersection")]
     return parts[0] if parts else "inactive"
 
