@@ -175,6 +175,22 @@ def test_a_truth_value_is_no_section_and_no_surface_but_a_cost() -> None:
     assert value == 1.0
 
 
+def test_a_comparison_is_no_trigger_of_a_reset_and_no_declared_surface() -> None:
+    bounce = fl.Reset(lambda t, x: x[0] < 0.0, lambda t, x: [x[0], -x[1]])
+    with pytest.raises(fl.ModelError, match=r"resets\[0\].h returned a comparison, .* the difference"):
+        fl.solve_ivp(lambda t, x: [x[1], -9.8], (0, 5), [1.0, 0.0], resets=bounce)
+    with pytest.raises(fl.ModelError, match=r"surfaces\[0\] returned a comparison, .* the difference"):
+        fl.solve_ivp(lambda t, x: [x[1], -9.8], (0, 5), [1.0, 0.0], surfaces=lambda t, x: x[0] > 0.5)
+    with pytest.raises(fl.ModelError, match="must return one number, not a list of 1"):
+        fl.solve_ivp(lambda t, x: [x[1], -9.8], (0, 5), [1.0, 0.0], surfaces=lambda t, x: [x[0]])
+
+
+def test_an_ensemble_without_members_is_refused() -> None:
+    scaled = fl.System(lambda t, x, a=1.0: [-a * np.sign(x[0])], n=1)
+    with pytest.raises(fl.InputError, match="a: an ensemble needs one member at least"):
+        scaled.ensemble((0, 1), [1.0], {"a": []})
+
+
 def test_a_solution_names_the_nearest_field_and_how_to_read_a_state() -> None:
     sol = RELAY.solve((0, 1), [1.0])
     with pytest.raises(AttributeError, match="did you mean 'switches'"):

@@ -387,6 +387,9 @@ def _members(
     lengths = {name: len(value) for name, value in given.items() if value.ndim == 1}
     if states.ndim == 2:
         lengths = {"y0": len(states), **lengths}
+    for name, length in lengths.items():
+        if length == 0:
+            raise InputError(f"{name}: an ensemble needs one member at least")
     count = next(iter(lengths.values()), 1)
     for name, length in lengths.items():
         if length != count:

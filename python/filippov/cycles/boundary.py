@@ -19,7 +19,7 @@ __all__ = ["beyond_boundary"]
 def beyond_boundary(
     state: Equilibrium, surface: int, name: str, bounds: tuple[float, float] = (-np.inf, np.inf)
 ) -> tuple[Equilibrium, float] | None:
-    """Return the equilibrium of another mode that goes on from a boundary, and where a parameter leads it.
+    """Return the equilibrium that continues in another mode from a boundary, and its direction there.
 
     Parameters
     ----------

@@ -498,7 +498,7 @@ def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
 
 
 def in_parts(cycle: Cycle) -> Cycle | None:
-    """Return the same cycle with legs divided along which perturbations grow much; nothing if none is.
+    """Return the same cycle with every leg of large growth divided; None if there is none.
 
     Raises
     ------

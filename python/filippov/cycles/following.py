@@ -665,7 +665,7 @@ class _Side:
         return False
 
     def _turns_to(self, new: Cycle, direction: float, value: float, jumps: bool = False) -> bool:
-        """Go on with a cycle, away from the point that it comes to on the way to a value of the parameter.
+        """Continue from a cycle, away from the special point on the way to a value of the parameter.
 
         Parameters
         ----------

@@ -172,11 +172,11 @@ def phase_portrait(
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    if system.n not in (None, 2):
+        raise InputError(f"system: a portrait is of two states, not {system.n}")
     window = finite_array([list(pair) for pair in box], "box")
     if window.shape != (2, 2) or not (window[:, 0] < window[:, 1]).all():
         raise InputError("box: two intervals (low, high) with low < high are needed, one for each state")
-    if system.n not in (None, 2):
-        raise InputError(f"system: a portrait is of two states, not {system.n}")
     motions = Motions(system, 2, system.parameter_values(params), (), {})
     if depends_on_time(motions, 1.0):
         raise InputError("system: it depends on the time; a portrait is of one that does not")

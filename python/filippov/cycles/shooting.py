@@ -167,7 +167,7 @@ class Shooting:
 
     @cached_property
     def swing(self) -> Array:
-        """The largest change of each state from the start to the middle of a leg, shape (n,), in the guess."""
+        """The largest change of each state from the start to the middle of a leg in the guess, (n,)."""
         t, found = self._guess.t0, np.zeros(self.n)
         for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
             middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration).x

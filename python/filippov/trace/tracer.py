@@ -32,6 +32,8 @@ __all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
 
 # What a warning says of an event or a section with a law that the run does not follow.
 OWN_LAW = "a floor, a relay or a table that the run does not follow"
+# The roles of functions whose zeros are switches: a truth value has none.
+_CHANGES_SIGN = ("surfaces[", "resets[")
 
 Vector = NDArray[np.float64]
 _T = TypeVar("_T")
@@ -536,7 +538,12 @@ def _nodes(tracer: Tracer, result: Any, role: str, n: int | None) -> list[int]:
         if isinstance(result, np.ndarray) and result.size == 1:
             result = result.reshape(())[()]
         if isinstance(result, (list, tuple, np.ndarray)):
-            raise ModelError(f"{role} must return one number, not {len(result)}")
+            raise ModelError(f"{role} must return one number, not a {type(result).__name__} of {len(result)}")
+        if isinstance(result, Condition) and role.startswith(_CHANGES_SIGN):
+            raise ModelError(
+                f"{role} returned a comparison, which is true or false and never changes its sign: "
+                "in place of `a > b` return the difference `a - b`"
+            )
         return [_node(tracer, result, role)]
     if isinstance(result, (Scalar, Condition)) or np.isscalar(result):
         if n == 1:
