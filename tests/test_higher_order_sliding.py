@@ -14,6 +14,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp as solve_stiff
 
 METHODS = ("auto", "Taylor", "DOPRI5", "DOP853", "Rodas5P")
 
@@ -185,6 +186,101 @@ def test_tank_runs_empty_and_is_filled_again(fun: Any, method: str) -> None:
     # From empty on: with u = sqrt(x), t - 3 = -2 u - log(1 - 2 u).
     u = math.sqrt(sol.y[0, -1])
     assert -2 * u - math.log(1 - 2 * u) == pytest.approx(3.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("k1", [0.3, 1.35])
+@pytest.mark.parametrize("method", METHODS)
+def test_super_twisting_is_left_where_the_disturbance_exceeds_it(method: str, k1: float) -> None:
+    """Beside the surface x follows (v / k1)**2, which is flatter than any step resolves at first."""
+    t0, end = 0.5, 2.0
+    sol = fl.solve_ivp(
+        super_twisting(k1, 1.0, lambda t: 0.5 + t), (0, end), [0.0, 0.0], method=method, rtol=1e-8, atol=1e-10
+    )
+    assert sol.success
+    leaves = sol.switches[0]
+    assert (leaves.kind, str(leaves.mode_after)) == ("exit_sliding", "+")
+    assert leaves.t == pytest.approx(t0, abs=1e-9)
+    assert len(sol.switches) < 12
+    t = np.linspace(t0, end, 40)
+    assert sol.sol(t)[1] == pytest.approx((t - t0) ** 2 / 2, abs=1e-7)
+    # With y = sqrt(x): y' = (v / y - k1) / 2, y = c tau**2 - 4 c**2 / k1 tau**3 + ..., c = 1 / (2 k1).
+    c, first = 0.5 / k1, 1e-3 * k1**2
+    series = c * first**2 - 4 * c**2 / k1 * first**3 + 40 * c**3 / k1**2 * first**4
+    with_root = solve_stiff(
+        lambda tau, y: [(0.5 * tau**2 / y[0] - k1) / 2],
+        (first, end - t0),
+        [series],
+        "Radau",
+        rtol=1e-10,
+        atol=1e-16,
+    )
+    assert with_root.success
+    assert sol.y[0, -1] == pytest.approx(with_root.y[0, -1] ** 2, abs=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+@pytest.mark.parametrize("method", METHODS)
+def test_cube_root_passes_zero_with_what_drives_it(method: str) -> None:
+    """Beside 0 the state is the cube of the drive, and the steps that would resolve it have no length."""
+    sol = fl.solve_ivp(
+        lambda t, x: [-np.cbrt(x[0]) + 0.3 * np.sin(t)], (0, 8), [1.0], method=method, rtol=1e-8, atol=1e-10
+    )
+    assert sol.success
+    # With u = cbrt(x), 3 u**2 u' = 0.3 sin(t) - u; from t = 2 pi on, where u = 0.3 tau - ... .
+    tau = 1e-3
+    drive = solve_stiff(
+        lambda t, u: [(0.3 * np.sin(t) - u[0]) / (3 * u[0] ** 2)],
+        (tau, 8 - 2 * math.pi),
+        [0.3 * tau - 3 * 0.3**3 * tau**2],
+        "Radau",
+        rtol=1e-10,
+        atol=1e-14,
+    )
+    assert sol.y[0, -1] == pytest.approx(drive.y[0, -1] ** 3, abs=1e-7)
+    assert np.abs(sol.sol(np.pi + np.linspace(-1e-3, 1e-3, 5))).max() < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "level", [lambda x: np.sqrt(np.maximum(x, 0)), lambda x: np.sqrt(x) if x > 0 else 0.0]
+)
+def test_empty_tank_is_filled_from_the_kink_of_its_inflow(level: Callable[[Any], Any], method: str) -> None:
+    sol = fl.solve_ivp(
+        lambda t, x: [np.maximum(np.sin(t), 0) - level(x[0])],
+        (0, 14),
+        [1.0],
+        method=method,
+        rtol=1e-8,
+        atol=1e-10,
+    )
+    assert sol.success
+    assert sol.sol(12.5)[0] == pytest.approx(0.0, abs=1e-9)
+    # With u = sqrt(x): u' = (sin(tau) / u - 1) / 2 from 4 pi on, and u begins with tau / 2.
+    tau = 1e-5
+    filled = solve_stiff(
+        lambda t, u: [(np.sin(t) / u[0] - 1) / 2],
+        (tau, 14 - 4 * math.pi),
+        [tau / 2],
+        "Radau",
+        rtol=1e-10,
+        atol=1e-14,
+    )
+    assert sol.y[0, -1] == pytest.approx(filled.y[0, -1] ** 2, abs=1e-6)
+
+
+def test_events_are_found_where_a_root_holds_the_motion_to_its_surface() -> None:
+    sol = fl.solve_ivp(
+        super_twisting(1.35, 1.0, lambda t: 0.5 + t),
+        (0, 1),
+        [0.0, 0.0],
+        events=[lambda t, x: t - 0.5005, lambda t, x: x[1] - 2e-8],
+        rtol=1e-8,
+        atol=1e-10,
+    )
+    assert sol.t_events is not None
+    assert sol.t_events[0] == pytest.approx([0.5005], abs=1e-9)
+    assert sol.t_events[1] == pytest.approx([0.5002], abs=1e-6)
 
 
 def test_root_that_is_left_by_the_motion_ends_the_run() -> None:

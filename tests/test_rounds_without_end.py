@@ -41,6 +41,16 @@ def test_mean_of_the_rounds_takes_over_below_the_tolerance(tolerance: float) -> 
     assert np.abs(finer.sol(t) - sol.sol(t)).max() <= bound + tolerance
 
 
+def test_mean_of_rounds_has_no_derivatives_of_the_rounds() -> None:
+    """The rounds still turn by the start; the mean does not."""
+    with pytest.warns(fl.FilippovWarning, match="no_derivative"), pytest.warns(match="averaged"):
+        sol = fl.solve_ivp(network, (0, 9), [0.5] * 4, rtol=1e-3, atol=1e-3, wrt="y0")
+    last = sol.switches[-1]
+    assert (last.kind, last.derivative.lost) == ("accumulation", "accumulation")
+    assert np.isfinite(sol.derivative(last.t - 0.1)).all()
+    assert np.isnan(sol.derivative(last.t + 0.1)).all()
+
+
 def test_rounds_that_shrink_like_one_over_n_have_no_limit_in_time() -> None:
     """Their size falls like exp(-t): at no tolerance does a run jump ahead."""
     sol = fl.solve_ivp(network, (0, 9), [0.5] * 4)

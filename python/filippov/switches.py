@@ -585,7 +585,10 @@ def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switc
 _WHY_LOST = {
     "grazing": "the motion touches the surface that ends it, and the time of that has no derivative",
     "one-sided": "several switches come at one time, and the derivative depends on their order",
-    "accumulation": "the switches before the limit make no rounds that could be extrapolated",
+    "accumulation": (
+        "the switches before the limit make no rounds that could be extrapolated, or the motion is known "
+        "up to the tolerance only"
+    ),
     "unsupported": "sliding of higher order, or rest, begins or ends",
     "not_finite": "a derivative is not finite",
 }

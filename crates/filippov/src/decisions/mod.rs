@@ -8,6 +8,7 @@
 mod blow_up;
 mod candidate;
 mod choice;
+mod clinging;
 mod consistency;
 mod contact;
 mod decide;
@@ -37,6 +38,7 @@ mod trial;
 mod viable;
 mod zero_surfaces;
 
+pub(crate) use clinging::cling;
 pub(crate) use consistency::differs_between_sides;
 pub(crate) use decide::decide;
 pub(crate) use end_of_sliding::{end_of_sliding, lost_guards, EndOfSliding};

@@ -366,6 +366,9 @@ impl<'w> Walk<'w> {
             rtol: options.rtol,
             atol: options.atol.clone(),
         };
+        if record.replaces {
+            return Ok(Some("accumulation"));
+        }
         let is_limit = record.t[0] != record.t[1];
         let mut instant = Instant {
             extended,

@@ -308,8 +308,9 @@ impl<'a> Tangents<'a> {
             let start = self.t_start.unwrap_or(record.t[0]);
             self.found.borders.starts_at_action |=
                 is_missed_later(self.around.extended, record, start, &self.kinds);
+            let replaced = record.replaces.then_some(Lost::Accumulation);
             for mut found in all {
-                found.lost = self.lost.or(found.lost);
+                found.lost = self.lost.or(replaced).or(found.lost);
                 found.lost.into_iter().for_each(|lost| self.lose(lost));
                 self.keep_instant(found);
             }
@@ -380,6 +381,7 @@ impl Tangents<'_> {
         let (n, sizes) = (extended.n, (extended.n, extended.n_parameters()));
         let unknown = |t: f64| InstantDerivative::unknown(t, self.kinds.len(), sizes);
         let [mut last, mut limit] = record.t.map(unknown);
+        let time = time.filter(|_| !record.replaces);
         let found = time.and_then(|time| {
             let dt: Vec<f64> = self.columns.iter().map(|c| dot(&time, c)).collect();
             last.dt.clone_from(&dt);

@@ -42,6 +42,12 @@ impl Progress {
         self.n_since
     }
 
+    /// Since when time has not gone on, at `t`.
+    pub fn stands_since(&self, t: f64) -> f64 {
+        let is_near = |since: &f64| t - since <= NO_PROGRESS * t.abs();
+        self.since.filter(is_near).unwrap_or(t)
+    }
+
     /// A switch happens here.
     pub fn note_place(&mut self, t: f64, x: &[f64], scale: &ErrorScale) {
         let mut pairs = self.place.iter().zip(x).enumerate();

@@ -6,11 +6,11 @@ use crate::decisions::limits::{
     limits_of_impacts, passed_beside, Limit, Passed,
 };
 use crate::decisions::{
-    add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
-    located_surfaces, mean_of_rounds, refusal, rest_within_tolerance, sides, triggers_reached,
-    warn_against_direction, warn_oscillation, warn_unknown_side, warn_zero_surface, zero_surfaces,
-    Cause, Decision, EndOfSliding, Leap, Left, Lefts, Next, Notes, Point, Reached, RestingPlace,
-    Rule, Scene, Sides, Values,
+    add_vanishing_surfaces, cling, decide, differs_between_sides, end_of_sliding, goes_through,
+    landing, located_surfaces, mean_of_rounds, refusal, rest_within_tolerance, sides,
+    triggers_reached, warn_against_direction, warn_oscillation, warn_unknown_side,
+    warn_zero_surface, zero_surfaces, Cause, Decision, EndOfSliding, Leap, Left, Lefts, Next,
+    Notes, Point, Reached, RestingPlace, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
@@ -105,8 +105,18 @@ impl<'a> Integrator<'a> {
         if self.recorder.observed.is_some() {
             self.recorder.leave(&mut self.run, &event.guards)?;
         }
-        if self.progress.n_switches_at(self.run.t) > MOST_SWITCHES_AT_ONE_TIME {
+        let n_switches = self.progress.n_switches_at(self.run.t);
+        if n_switches > MOST_SWITCHES_AT_ONE_TIME {
             return self.leave_without_progress(event);
+        }
+        if n_switches > 1 && self.recorder.only_touches_at(self.run.t) {
+            let touched = self.recorder.surfaces_switched_at(self.run.t);
+            let is_of_higher_degree = |j| self.run.system.reduced(&[j]).is_some();
+            if matches!(touched[..], [j] if is_of_higher_degree(j)) {
+                if let Some(ended) = cling_to_surface(self, true)? {
+                    return Ok(ended);
+                }
+            }
         }
         if !self.run.actions.list.is_empty() {
             follow_laws(self)?;
@@ -208,6 +218,7 @@ impl<'a> Integrator<'a> {
                 let (switches, scale) = (self.recorder.switches(), &self.run.scale);
                 if self.progress.rounds.are_small(switches, scale) {
                     if let Some(mean) = self.ask(Cause::Start, mean_of_rounds)? {
+                        self.recorder.replace();
                         return self.jump_to(mean, next.mode);
                     }
                 }
@@ -220,6 +231,7 @@ impl<'a> Integrator<'a> {
     fn leave_without_progress(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         let mut surfaces = self.recorder.surfaces_switched_at(self.run.t);
         if let Some(limit) = self.ask(Cause::Start, |at, _| limit_here(at, &surfaces))? {
+            forget_choices(self);
             let mode = self.run.motion.mode.clone();
             return self.jump_to(limit, mode);
         }
@@ -233,7 +245,8 @@ impl<'a> Integrator<'a> {
         Ok(Some(Stop::NoProgress { surfaces }))
     }
 
-    /// Where the motion can be followed no further: goes on at rest, if it has come to one within the tolerance. Else the run ends.
+    /// Where the motion can be followed no further: goes on at rest, if it has come to one within the tolerance, or along a surface to
+    /// which a root holds it. Else the run ends.
     #[cold]
     pub(super) fn rest_or_stop(&mut self, stop: Stop) -> Result<Option<Stop>, FieldError> {
         let is_first = self.progress.rested.replace(self.run.t) != Some(self.run.t);
@@ -241,8 +254,9 @@ impl<'a> Integrator<'a> {
             return Ok(Some(stop));
         }
         let Some(rest) = self.ask(Cause::Start, rest_within_tolerance)? else {
-            return Ok(Some(stop));
+            return Ok(cling_to_surface(self, false)?.unwrap_or(Some(stop)));
         };
+        forget_choices(self);
         let RestingPlace { x, surfaces, next } = rest;
         let y_before = SmallVec::from_slice(&self.run.x);
         self.run.x = x;
@@ -913,6 +927,47 @@ impl<'a> Integrator<'a> {
         }
         Ok(stop)
     }
+}
+
+/// Goes on along a surface to which a root holds the motion; `None` if there is none, or none that the motion `leaves` if it is to.
+#[cold]
+fn cling_to_surface(
+    integrator: &mut Integrator<'_>,
+    leaves: bool,
+) -> Result<Option<Option<Stop>>, FieldError> {
+    let horizon = integrator.horizon;
+    let found = integrator.ask(Cause::Start, |at, notes| cling(at, notes, horizon))?;
+    let Some(clinging) = found.filter(|found| found.leaves || !leaves) else {
+        return Ok(None);
+    };
+    integrator.recorder.leave(&mut integrator.run, &[])?;
+    integrator.recorder.replace();
+    for (t, x) in clinging.pieces {
+        let (t0, x0) = (integrator.run.t, &integrator.run.x);
+        integrator.stepper.set_straight(t0, t - t0, x0, &x);
+        let (mut search, recorder) = integrator.step_search();
+        let Some(zeros) = recorder.find_user_zeros(&mut search, 1.0, t)? else {
+            let surfaces = vec![clinging.surface];
+            return Ok(Some(Some(Stop::NoProgress { surfaces })));
+        };
+        if let Some(stop) = recorder.record_user_zeros(&mut search, zeros, (1.0, t))? {
+            return Ok(Some(Some(stop)));
+        }
+        integrator.move_straight(t, x)?;
+    }
+    integrator.control.forget_proposal();
+    integrator.go_on_from_here(&[]).map(Some)
+}
+
+/// Forgets the choices since time last went on: the motion has come back at once, whatever was chosen.
+fn forget_choices(integrator: &mut Integrator<'_>) {
+    let since = integrator.progress.stands_since(integrator.run.t);
+    let n_before = integrator.warnings.len();
+    integrator
+        .warnings
+        .retain(|warning| warning.code != WarningCode::NonUnique || warning.t < since);
+    let n_forgotten = n_before - integrator.warnings.len();
+    integrator.n_choices = integrator.n_choices.saturating_sub(n_forgotten);
 }
 
 /// Updates the discrete states that the mode did not read. A decision may read them.

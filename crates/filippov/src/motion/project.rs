@@ -58,7 +58,8 @@ impl Projector {
                 .zip(&*x)
                 .map(|(g, x)| (g * x).abs())
                 .sum();
-            if norm2 == 0.0 || h.abs() <= 0.25 * ROUNDING * size {
+            // A root may have no slope on its surface.
+            if norm2 == 0.0 || !norm2.is_finite() || h.abs() <= 0.25 * ROUNDING * size {
                 break;
             }
             let shift = h / norm2;
@@ -209,7 +210,8 @@ pub fn shares_of_rows(rows: &[f64], values: &[f64]) -> Option<Vector> {
         }
     }
     let shares = gram.solve_gram(values);
-    let is_finite = shares.iter().all(|v| v.is_finite());
+    // A root may have no slope on its surface, and nothing moves along that.
+    let is_finite = shares.iter().chain(rows).all(|v| v.is_finite());
     is_finite.then_some(shares)
 }
 

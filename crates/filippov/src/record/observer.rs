@@ -85,6 +85,9 @@ pub struct InstantRecord<'i> {
     pub map: Option<&'i [f64]>,
     /// The actions that are done, in their order.
     pub acts: &'i [Act],
+    /// Is the next motion followed in the place of one that is the same only up to the tolerance? Then a small change of the state is not
+    /// known any more.
+    pub replaces: bool,
 }
 
 /// The record of an instant, for later.
@@ -99,6 +102,7 @@ pub(crate) struct KeptInstant {
     gradient: Gradient,
     map: Option<Vec<f64>>,
     acts: Vec<Act>,
+    replaces: bool,
 }
 
 impl KeptInstant {
@@ -114,6 +118,7 @@ impl KeptInstant {
             gradient: record.gradient.clone(),
             map: record.map.map(<[f64]>::to_vec),
             acts: record.acts.to_vec(),
+            replaces: record.replaces,
         }
     }
 
@@ -144,6 +149,7 @@ impl KeptInstant {
             gradient: &self.gradient,
             map: self.map.as_deref(),
             acts: &self.acts,
+            replaces: self.replaces,
         }
     }
 }
@@ -173,6 +179,7 @@ pub(crate) struct Observed<'a> {
     gradient: Gradient,
     map: Option<Vec<f64>>,
     acts: Vec<Act>,
+    replaces: bool,
 }
 
 impl<'a> Observed<'a> {
@@ -189,6 +196,7 @@ impl<'a> Observed<'a> {
             gradient: Gradient::default(),
             map: None,
             acts: Vec::new(),
+            replaces: false,
         }
     }
 
@@ -216,6 +224,7 @@ impl<'a> Observed<'a> {
         self.guards = SmallVec::from_slice(guards);
         self.map = None;
         self.acts.clear();
+        self.replaces = false;
         let n = run.x.len();
         self.field.resize(n, 0.0);
         self.gradient.state.resize(n, 0.0);
@@ -237,6 +246,11 @@ impl<'a> Observed<'a> {
     pub fn act(&mut self, derivative: Option<Vec<f64>>, acts: Vec<Act>) {
         self.map = derivative.or(self.map.take());
         self.acts.extend(acts);
+    }
+
+    /// The motion that follows is the same as that of the system up to the tolerance only.
+    pub fn replace(&mut self) {
+        self.replaces = true;
     }
 
     /// The run ends. In an instant no motion follows: that of the mode before stands for it.
@@ -271,6 +285,7 @@ impl<'a> Observed<'a> {
             gradient: &self.gradient,
             map: self.map.as_deref(),
             acts: &self.acts,
+            replaces: self.replaces,
         });
     }
 }

@@ -12,8 +12,8 @@ use crate::record::{DecisionRecord, Observed, ObservedStep, Segment, Solution, S
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::{Interpolant, Steppers};
-use crate::switch::Switch;
-use crate::tolerances::{EPS, LATEST_SWITCHES, SAME_TICK};
+use crate::switch::{Kind, Switch};
+use crate::tolerances::{EPS, LATEST_SWITCHES, MOST_TOUCHES_AT_ONE_TIME, SAME_TICK};
 
 /// Room that is made at once for so many steps and switches: more of them take more room then.
 const USUAL_LENGTH: usize = 64;
@@ -255,6 +255,13 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// The motion that follows this instant is the same as that of the system up to the tolerance only.
+    pub fn replace(&mut self) {
+        if let Some(observed) = &mut self.observed {
+            observed.replace();
+        }
+    }
+
     #[cold]
     #[inline(never)]
     fn show_step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
@@ -344,6 +351,13 @@ impl<'a> Recorder<'a> {
         surfaces.sort_unstable();
         surfaces.dedup();
         surfaces
+    }
+
+    /// Are the last switches so many touches at this very time that they look endless?
+    pub fn only_touches_at(&self, t: f64) -> bool {
+        let latest = self.switches.iter().rev();
+        let touches = latest.take_while(|s| s.t == t && s.kind == Kind::Grazing);
+        touches.take(MOST_TOUCHES_AT_ONE_TIME).count() == MOST_TOUCHES_AT_ONE_TIME
     }
 
     /// Makes the switches, if they are wanted, and the ends the points of the result.

@@ -127,6 +127,18 @@ pub const PLACES_BESIDE_REST: [f64; 2] = [1.0, 1e-3];
 /// Newton steps that look for such a place.
 pub const STEPS_BESIDE_REST: usize = 6;
 
+/// A motion that a root holds to a surface is followed there up to so many tolerances at most: it leaves beyond the first.
+pub const MOST_CLINGING: f64 = 4.0;
+
+/// How far such a motion may bend away from the straight lines that are recorded, in tolerances.
+pub const BEND_OF_CLINGING: f64 = 0.25;
+
+/// Straight lines of one such motion at most.
+pub const PIECES_OF_CLINGING: usize = 10_000;
+
+/// Halvings that find where it is held.
+pub const HALVINGS_OF_CLINGING: usize = 52;
+
 /// Flights that shrink by this factor or more at a time end soon, whether the factors agree or not.
 pub const FAST_SHRINKING: f64 = 0.5;
 
