@@ -31,7 +31,7 @@ pub(super) struct Model {
     pub n_states: usize,
     pub names: Names,
     backend: Backend,
-    field_program: FieldProgram,
+    pub field_program: FieldProgram,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
     single_rates: Vec<OnceLock<TieredProgram>>,
@@ -136,7 +136,7 @@ const MOST_JACOBIANS: usize = 64;
 const LARGEST_AWAITED: usize = 10_000;
 
 /// The field: every run needs it, so that it is compiled at once, unless that takes long.
-enum FieldProgram {
+pub(super) enum FieldProgram {
     Compiled(Program),
     Tiered(Box<TieredProgram>),
 }
@@ -220,7 +220,6 @@ impl Model {
     }
 
     /// The field.
-    #[inline(always)]
     pub fn field_program(&self) -> &Program {
         match &self.field_program {
             FieldProgram::Compiled(program) => program,
