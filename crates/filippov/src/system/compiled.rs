@@ -237,10 +237,19 @@ impl Model {
 
     /// Does one of these surfaces have a higher relative degree than 1?
     pub fn is_reducible(&self, surfaces: &[usize]) -> bool {
-        surfaces.iter().any(|&j| {
-            let find = || relative_degree(&self.graph, &self.field, j);
-            *self.relative_degrees[j].get_or_init(find) > 1
-        })
+        surfaces
+            .iter()
+            .any(|&j| match self.relative_degrees[j].get() {
+                Some(&degree) => degree > 1,
+                None => self.find_relative_degree(j) > 1,
+            })
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_relative_degree(&self, j: usize) -> usize {
+        let find = || relative_degree(&self.graph, &self.field, j);
+        *self.relative_degrees[j].get_or_init(find)
     }
 
     /// What is left of the system where a motion slides on these surfaces, if one of them has a higher relative degree.

@@ -189,6 +189,21 @@ impl TracedSystem {
 }
 
 impl TracedSystem {
+    /// What is left of the system where a motion slides on these surfaces, one of which has a higher relative degree.
+    #[cold]
+    #[inline(never)]
+    fn reduction(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
+        let make = || {
+            self.model
+                .reduced(surfaces)
+                .map(|model| self.with_model(model))
+        };
+        let reduced = self.reductions.get_or_make(surfaces, make);
+        reduced.map(|system| system as _)
+    }
+}
+
+impl TracedSystem {
     /// Values and rates of switching functions that have to be computed.
     #[inline(never)]
     fn computed_rates(&self, place: &Place<'_>, v: &[f64], h: &mut [f64], rate: &mut [f64]) {
@@ -403,16 +418,10 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn reduced(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
-        if !self.model.is_reducible(surfaces) {
-            return None;
+        match self.model.is_reducible(surfaces) {
+            true => self.reduction(surfaces),
+            false => None,
         }
-        let make = || {
-            self.model
-                .reduced(surfaces)
-                .map(|model| self.with_model(model))
-        };
-        let reduced = self.reductions.get_or_make(surfaces, make);
-        reduced.map(|system| system as _)
     }
 
     fn surface_name(&self, j: usize) -> String {
