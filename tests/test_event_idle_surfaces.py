@@ -105,3 +105,20 @@ def test_the_number_and_the_times_of_switches_are_those_of_their_table() -> None
     copy = pickle.loads(pickle.dumps(sol.switches))
     assert copy.t.tolist() == times.tolist()
     assert copy.kind.tolist() == sol.switches.kind.tolist()
+
+
+def test_series_beside_bent_surfaces_that_are_not_reached_have_the_order_of_none() -> None:
+    def field(n_idle: int) -> Callable[[float, Any], list[Any]]:
+        def rates(t: float, x: Any) -> list[Any]:
+            idle = 0.0
+            for k in range(n_idle):
+                idle = idle + 0.01 * np.sign(x[0] ** 2 + x[1] ** 2 - (30.0 + k) ** 2)
+            return [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1]) + idle]
+
+        return rates
+
+    steps = [
+        fl.solve_ivp(field(n), (0, 60), [1.0, 2.0], method="Taylor", rtol=1e-9, atol=1e-9).stats["n_steps"]
+        for n in (0, 100)
+    ]
+    assert steps[1] <= 1.1 * steps[0]

@@ -41,19 +41,26 @@ thread_local! {
     static HANDED_ON: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A program in native code.
+/// A program in native code: one function.
 pub(crate) struct NativeCode {
     function: CompiledFunction,
-    /// What follows on the function of a large program.
-    further: Option<Box<Further>>,
+    /// Keeps the memory of the function.
+    _module: OwnedModule,
+}
+
+/// A large program in native code: functions, called in their order. It is not a case of [`NativeCode`], so that a call of that is a
+/// call of its function and nothing else.
+pub(crate) struct NativeChain {
+    functions: Vec<CompiledFunction>,
+    n_handed_on: usize,
     /// Keeps the memory of the functions.
     _module: OwnedModule,
 }
 
-/// The other functions of a large program, in their order.
-struct Further {
-    functions: Vec<CompiledFunction>,
-    n_handed_on: usize,
+/// What a program is compiled to.
+pub(crate) enum Compiled {
+    Whole(NativeCode),
+    Chain(NativeChain),
 }
 
 impl NativeCode {
@@ -62,36 +69,42 @@ impl NativeCode {
         passes_self_test()
     }
 
+    /// Runs the program; the caller has checked the lengths.
+    #[inline(always)]
+    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        call(self.function, arguments, out, std::ptr::null_mut());
+    }
+}
+
+impl NativeChain {
+    /// Runs the program; the caller has checked the lengths.
+    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        HANDED_ON.with_borrow_mut(|handed_on| {
+            if handed_on.len() < self.n_handed_on {
+                handed_on.resize(self.n_handed_on, 0.0);
+            }
+            let handed_on = handed_on.as_mut_ptr();
+            for &function in &self.functions {
+                call(function, arguments, out, handed_on);
+            }
+        });
+    }
+}
+
+impl Compiled {
     /// Compiles a scheduled program.
     pub fn new(graph: &Graph, schedule: &Schedule) -> Result<Self, ExprError> {
         if !passes_self_test() {
             return unavailable("the self-test on this platform failed");
         }
-        compile(graph, schedule)
+        compile_in_chunks(graph, schedule, CHUNK)
     }
 
-    /// Runs the program; the caller has checked the lengths.
-    #[inline(always)]
-    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
-        match &self.further {
-            None => call(self.function, arguments, out, std::ptr::null_mut()),
-            Some(further) => self.run_all(further, arguments, out),
+    fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        match self {
+            Compiled::Whole(code) => code.run(arguments, out),
+            Compiled::Chain(chain) => chain.run(arguments, out),
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn run_all(&self, further: &Further, arguments: Arguments<'_>, out: &mut [f64]) {
-        HANDED_ON.with_borrow_mut(|handed_on| {
-            if handed_on.len() < further.n_handed_on {
-                handed_on.resize(further.n_handed_on, 0.0);
-            }
-            let handed_on = handed_on.as_mut_ptr();
-            call(self.function, arguments, out, handed_on);
-            for &function in &further.functions {
-                call(function, arguments, out, handed_on);
-            }
-        });
     }
 }
 
@@ -104,8 +117,8 @@ fn call(
     handed_on: *mut f64,
 ) {
     let Arguments { t, x, s, p, v } = arguments;
-    // SAFETY: the code was made by `compile` for this signature and lives as long as the `_module` of the `NativeCode`
-    // whose method called this. It reads x, s, p, v below the program's `Lengths` and writes `out` below its number of outputs,
+    // SAFETY: the code was made by `compile_in_chunks` for this signature and lives as long as the `_module` of the `NativeCode`
+    // or the `NativeChain` whose method called this. It reads x, s, p, v below the program's `Lengths` and writes `out` below its number of outputs,
     // which `Program::eval`, the only caller beside the self-test, has compared with the slices. It reads and writes `handed_on`
     // below `n_handed_on`, which is not null where that is not 0.
     unsafe {
@@ -127,6 +140,12 @@ impl std::fmt::Debug for NativeCode {
     }
 }
 
+impl std::fmt::Debug for NativeChain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NativeChain").finish_non_exhaustive()
+    }
+}
+
 /// The module with the code in memory, which would leak if it were only dropped. The mutex makes it
 /// shareable; it is never locked.
 struct OwnedModule(Mutex<Option<Box<JITModule>>>);
@@ -138,7 +157,7 @@ impl Drop for OwnedModule {
             Err(poisoned) => poisoned.into_inner().take(),
         };
         if let Some(module) = module {
-            // SAFETY: the function pointers into this memory are in the `NativeCode` that owns this module
+            // SAFETY: the function pointers into this memory are in the code that owns this module
             // and are not handed out; being dropped, it is not running.
             unsafe { module.free_memory() }
         }
@@ -185,16 +204,12 @@ fn target(single_pass: bool) -> Result<OwnedTargetIsa, ExprError> {
     }
 }
 
-fn compile(graph: &Graph, schedule: &Schedule) -> Result<NativeCode, ExprError> {
-    compile_in_chunks(graph, schedule, CHUNK)
-}
-
 /// Compiles a program into functions of so many nodes.
 fn compile_in_chunks(
     graph: &Graph,
     schedule: &Schedule,
     chunk: usize,
-) -> Result<NativeCode, ExprError> {
+) -> Result<Compiled, ExprError> {
     let target = target(schedule.order.len() > chunk)?;
     let mut builder = JITBuilder::with_isa(target, default_libcall_names());
     let called = called_operations(graph, schedule);
@@ -218,16 +233,17 @@ fn compile_in_chunks(
         // SAFETY: `define` gave every function exactly this signature, in the C convention of this machine.
         unsafe { std::mem::transmute::<*const u8, CompiledFunction>(address) }
     });
-    let mut functions: Vec<CompiledFunction> = functions.collect();
-    let function = functions.remove(0);
-    let further = Further {
-        functions,
-        n_handed_on: handed_on.len(),
-    };
-    Ok(NativeCode {
-        function,
-        further: (!further.functions.is_empty()).then(|| Box::new(further)),
-        _module: owner,
+    let functions: Vec<CompiledFunction> = functions.collect();
+    Ok(match functions[..] {
+        [function] => Compiled::Whole(NativeCode {
+            function,
+            _module: owner,
+        }),
+        _ => Compiled::Chain(NativeChain {
+            functions,
+            n_handed_on: handed_on.len(),
+            _module: owner,
+        }),
     })
 }
 
@@ -585,7 +601,7 @@ fn self_test() -> bool {
     };
     // As one function, and as a chain of short ones.
     let (Ok(whole), Ok(chain)) = (
-        compile(&graph, &schedule),
+        compile_in_chunks(&graph, &schedule, CHUNK),
         compile_in_chunks(&graph, &schedule, 7),
     ) else {
         return false;

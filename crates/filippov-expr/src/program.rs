@@ -3,7 +3,7 @@
 use crate::error::ExprError;
 use crate::graph::Graph;
 #[cfg(feature = "native")]
-use crate::native::NativeCode;
+use crate::native::{Compiled, NativeChain, NativeCode};
 use crate::node::NodeId;
 use crate::schedule::{Lengths, Schedule};
 use crate::tape::{Arguments, Tape};
@@ -35,6 +35,8 @@ pub struct Program {
 enum Code {
     #[cfg(feature = "native")]
     Native(NativeCode),
+    #[cfg(feature = "native")]
+    Chain(NativeChain),
     Interpreted(Tape),
 }
 
@@ -103,24 +105,29 @@ impl Program {
     #[inline]
     pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], v: &[f64], out: &mut [f64]) {
         if !self.fits(x, s, p, v, out) {
-            out.fill(f64::NAN);
-            debug_assert!(
-                self.fits(x, s, p, v, out),
-                "an argument is shorter than {:?}, {} outputs",
-                self.lengths,
-                self.n_outputs
-            );
-            return;
+            return self.refuse(out);
         }
         // Built in each arm: the native code takes registers, and nothing is written to memory for it.
         match &self.code {
             #[cfg(feature = "native")]
             Code::Native(code) => code.run(Arguments { t, x, s, p, v }, out),
-            Code::Interpreted(tape) => tape.run(Arguments { t, x, s, p, v }, out),
+            code => code.run_apart(Arguments { t, x, s, p, v }, out),
         }
     }
 
-    /// As [`Program::eval`], if this is native code and no argument is too short; else it does nothing and returns
+    /// An argument is too short.
+    #[cold]
+    #[inline(never)]
+    fn refuse(&self, out: &mut [f64]) {
+        out.fill(f64::NAN);
+        debug_assert!(
+            false,
+            "an argument is shorter than {:?}, {} outputs",
+            self.lengths, self.n_outputs
+        );
+    }
+
+    /// As [`Program::eval`], if this is one function of native code and no argument is too short; else it does nothing and returns
     /// `false`. For a caller that keeps everything else away from its fastest way.
     #[inline]
     #[cfg_attr(not(feature = "native"), allow(unused_variables))]
@@ -156,13 +163,25 @@ impl Program {
 }
 
 impl Code {
+    /// Runs whatever it is: apart, so that the way to one native function is short.
+    #[inline(never)]
+    fn run_apart(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        match self {
+            #[cfg(feature = "native")]
+            Code::Native(code) => code.run(arguments, out),
+            #[cfg(feature = "native")]
+            Code::Chain(chain) => chain.run(arguments, out),
+            Code::Interpreted(tape) => tape.run(arguments, out),
+        }
+    }
+
     #[cfg(feature = "native")]
     fn new(graph: &Graph, schedule: &Schedule, backend: Backend) -> Result<Self, ExprError> {
         match backend {
             Backend::Interpreter => Ok(Code::Interpreted(Tape::new(graph, schedule))),
-            Backend::Native => NativeCode::new(graph, schedule).map(Code::Native),
-            Backend::Auto => Ok(match NativeCode::new(graph, schedule) {
-                Ok(code) => Code::Native(code),
+            Backend::Native => Compiled::new(graph, schedule).map(Code::from),
+            Backend::Auto => Ok(match Compiled::new(graph, schedule) {
+                Ok(compiled) => Code::from(compiled),
                 Err(_) => Code::Interpreted(Tape::new(graph, schedule)),
             }),
         }
@@ -177,6 +196,16 @@ impl Code {
             Backend::Auto | Backend::Interpreter => {
                 Ok(Code::Interpreted(Tape::new(graph, schedule)))
             }
+        }
+    }
+}
+
+#[cfg(feature = "native")]
+impl From<Compiled> for Code {
+    fn from(compiled: Compiled) -> Self {
+        match compiled {
+            Compiled::Whole(code) => Code::Native(code),
+            Compiled::Chain(chain) => Code::Chain(chain),
         }
     }
 }

@@ -69,13 +69,14 @@ impl<'a> Integrator<'a> {
         } = problem;
         check(&problem)?;
         let n = system.n_states();
+        let run = Run::new(system, options, actions, (t_span.0, y0));
         Ok(Integrator {
-            run: Run::new(system, options, actions, (t_span.0, y0)),
             t_end: t_span.1,
             held,
             timetable: Timetable::new(actions, t_span.0),
             horizon: t_span.1,
-            stepper: Steppers::new(options, system, t_span.1 - t_span.0),
+            stepper: Steppers::new(&run, t_span.1 - t_span.0),
+            run,
             control: StepControl::new(),
             detector: Detector::new(n, system.n_surfaces()),
             recorder: Recorder::new(n, options, events),

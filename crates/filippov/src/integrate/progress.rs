@@ -3,6 +3,7 @@
 use crate::decisions::Rounds;
 use crate::error_scale::ErrorScale;
 use crate::stats::Stats;
+use crate::switch::Switch;
 use crate::tolerances::{MANY_SWITCHES, NO_PROGRESS, SAME_PLACE};
 
 /// What a run has come to.
@@ -22,7 +23,8 @@ pub(super) struct Progress {
     since: Option<f64>,
     /// How many came after it.
     n_since: u32,
-    /// Where the state was at a switch, since when it has not left this place, and how many switches there were since.
+    /// Where the state was at a switch, since when it has not left this place, and how many switches there were since; 0 if it was
+    /// never asked.
     place: Vec<f64>,
     here_since: f64,
     n_here: u64,
@@ -48,19 +50,28 @@ impl Progress {
         self.since.filter(is_near).unwrap_or(t)
     }
 
-    /// A switch happens here.
-    pub fn note_place(&mut self, t: f64, x: &[f64], scale: &ErrorScale) {
-        let mut pairs = self.place.iter().zip(x).enumerate();
-        let is_here = |(i, (place, x)): (usize, (&f64, &f64))| {
-            (x - place).abs() <= SAME_PLACE * scale.size(i, *place)
+    /// A switch happens here, after these. A run of few switches need not ask.
+    #[cold]
+    #[inline(never)]
+    pub fn note_place(&mut self, t: f64, x: &[f64], before: &[Switch], scale: &ErrorScale) {
+        let is_here = |place: &[f64], x: &[f64]| {
+            let mut pairs = place.iter().zip(x).enumerate();
+            pairs.all(|(i, (place, x))| (x - place).abs() <= SAME_PLACE * scale.size(i, *place))
         };
-        if self.place.len() == x.len() && pairs.all(is_here) {
+        if self.n_here > 0 && is_here(&self.place, x) {
             self.n_here += 1;
             return;
         }
+        // The first time the switches before count too.
+        let before = if self.n_here > 0 { &[] } else { before };
+        let here = before.iter().rev();
+        let here = here.take_while(|switch| is_here(x, &switch.y_before));
+        (self.here_since, self.n_here) = (t, 1);
+        for switch in here {
+            (self.here_since, self.n_here) = (switch.t, self.n_here + 1);
+        }
         self.place.clear();
         self.place.extend_from_slice(x);
-        (self.here_since, self.n_here) = (t, 1);
     }
 
     /// What the run has come to.

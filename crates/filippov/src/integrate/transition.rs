@@ -22,7 +22,7 @@ use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, Warning, WarningCode};
 use crate::switch::{Kind, Switch};
 use crate::system::{eval_on_side, ActionMap, Trigger};
-use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
+use crate::tolerances::{DOUBTFUL, FEW_SWITCHES, MOST_SWITCHES_AT_ONE_TIME};
 use smallvec::SmallVec;
 
 impl<'a> Integrator<'a> {
@@ -100,8 +100,10 @@ impl<'a> Integrator<'a> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.run.stats.n_switches += 1;
-        self.progress
-            .note_place(self.run.t, &self.run.x, &self.run.scale);
+        if self.run.stats.n_switches >= FEW_SWITCHES {
+            let (run, before) = (&self.run, self.recorder.switches());
+            self.progress.note_place(run.t, &run.x, before, &run.scale);
+        }
         if self.recorder.observed.is_some() {
             self.recorder.leave(&mut self.run, &event.guards)?;
         }

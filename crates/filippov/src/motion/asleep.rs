@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use crate::options::{Method, Options};
 use crate::system::{PiecewiseSystem, Setting};
-use crate::tolerances::{BOX_GROWTH, CLEAR_IN_BOX, FEWEST_ASLEEP};
+use crate::tolerances::{BOX_GROWTH, CLEAR_IN_BOX, FEWEST_ASLEEP, MOST_CHOSEN_SERIES};
 
 /// Surfaces whose functions are proved to have one sign all over a box of times and states. While the motion stays in the box they
 /// are not monitored.
@@ -13,7 +13,7 @@ use crate::tolerances::{BOX_GROWTH, CLEAR_IN_BOX, FEWEST_ASLEEP};
 /// The box is wider than where the motion has been, and wider again each time that the motion leaves it: it is left seldom,
 /// and then all signs are proved anew. Where the motion comes near to a surface the proof fails, and the surface is monitored. How
 /// wide the box is does not matter for what is proved.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Asleep {
     /// Systems with few surfaces do without.
     is_used: bool,
@@ -64,12 +64,46 @@ impl Asleep {
         self.sides.get(j).is_some_and(|&side| side != 0)
     }
 
+    /// The curved switching functions that are not asleep, if surfaces are asleep and these are few.
+    pub fn curved_awake(&self, system: &dyn PiecewiseSystem) -> Option<SmallVec<[usize; 4]>> {
+        if !self.has_any() {
+            return None;
+        }
+        let mut awake = SmallVec::new();
+        for j in (0..system.n_surfaces()).filter(|&j| !system.is_affine(j)) {
+            if self.is_proved(j) {
+                continue;
+            }
+            if awake.len() == MOST_CHOSEN_SERIES {
+                return None;
+            }
+            awake.push(j);
+        }
+        Some(awake)
+    }
+
+    /// The same where a run starts that has looked around nowhere yet.
+    pub fn curved_awake_at(
+        &self,
+        system: &dyn PiecewiseSystem,
+        (t, x, q): (f64, &[f64], &[f64]),
+    ) -> Option<SmallVec<[usize; 4]>> {
+        if !self.is_used {
+            return None;
+        }
+        let mut asleep = self.clone();
+        asleep.look_around(system, t, x, q);
+        asleep.curved_awake(system)
+    }
+
     /// Wakes all for good: where the field ends at its surfaces, their distance limits the steps.
     pub fn end(&mut self) {
         *self = Asleep::default();
     }
 
     /// Does the box contain this point, for these discrete states? If nothing is proved that does not matter.
+    #[cold]
+    #[inline(never)]
     pub fn contains_point(&self, t: f64, x: &[f64], discrete: &[f64]) -> bool {
         if self.around.is_empty() || self.discrete != discrete {
             return false;
@@ -79,9 +113,12 @@ impl Asleep {
     }
 
     /// What is proved at this point, for these discrete states.
+    #[inline(always)]
     pub fn known_at(&self, t: f64, x: &[f64], discrete: &[f64]) -> Option<&Self> {
-        let is_known = self.has_any() && self.contains_point(t, x, discrete);
-        is_known.then_some(self)
+        match self.has_any() {
+            true => self.contains_point(t, x, discrete).then_some(self),
+            false => None,
+        }
     }
 
     /// Does the box contain these ranges, time first, for these discrete states?

@@ -13,7 +13,6 @@ use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::Actions;
 use crate::system::{MotionJets, PiecewiseSystem, Setting};
-use crate::tolerances::MOST_CHOSEN_SERIES;
 
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
@@ -223,12 +222,24 @@ impl<'a> CurrentMotion<'a> {
         system: &dyn PiecewiseSystem,
         find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
     ) -> Option<Arc<MotionJets>> {
-        if self.known[self.current].jets.is_none() {
-            let awake = self.curved_awake(system);
-            let found = find(&self.sliding, awake.as_deref());
-            self.known[self.current].jets = Some(found);
+        match &self.known[self.current].jets {
+            Some(Some(jets)) => Some(Arc::clone(jets)),
+            Some(None) => None,
+            None => self.find_jets(system, find),
         }
-        self.known[self.current].jets.clone().flatten()
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_jets(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
+    ) -> Option<Arc<MotionJets>> {
+        let awake = self.asleep.curved_awake(system);
+        let found = find(&self.sliding, awake.as_deref());
+        self.known[self.current].jets = Some(found.clone());
+        found
     }
 
     fn find_monitored(&mut self, system: &dyn PiecewiseSystem, zeros: &[(Guard, Deflation)]) {
@@ -291,8 +302,17 @@ impl<'a> CurrentMotion<'a> {
     }
 
     /// The motion is about to start at this point: finds out which surfaces are asleep there.
+    #[inline(always)]
     pub fn look_around(&mut self, system: &dyn PiecewiseSystem, t: f64, x: &[f64]) {
-        if self.asleep.is_used() && !self.asleep.contains_point(t, x, &self.discrete) {
+        if self.asleep.is_used() {
+            self.find_asleep(system, t, x);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_asleep(&mut self, system: &dyn PiecewiseSystem, t: f64, x: &[f64]) {
+        if !self.asleep.contains_point(t, x, &self.discrete) {
             self.asleep.look_around(system, t, x, &self.discrete);
             self.known.clear();
         }
@@ -336,24 +356,6 @@ impl<'a> CurrentMotion<'a> {
             .collect();
         self.monitored.extend(kept);
         woken
-    }
-
-    /// The curved switching functions that are not asleep, if surfaces are asleep and these are few.
-    pub fn curved_awake(&self, system: &dyn PiecewiseSystem) -> Option<SmallVec<[usize; 4]>> {
-        if !self.asleep.has_any() {
-            return None;
-        }
-        let mut awake = SmallVec::new();
-        for j in (0..self.signs.len()).filter(|&j| !system.is_affine(j)) {
-            if self.asleep.is_proved(j) {
-                continue;
-            }
-            if awake.len() == MOST_CHOSEN_SERIES {
-                return None;
-            }
-            awake.push(j);
-        }
-        Some(awake)
     }
 
     /// The surfaces that it still leaves tangentially.

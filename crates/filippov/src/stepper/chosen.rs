@@ -4,26 +4,22 @@ use super::duties::{Attempt, ExitSeries, Ready, Stepper};
 use super::{Controller, Dop853, ErrorScale, Midpoint, Rodas5p, Step, Taylor};
 use crate::error::FieldError;
 use crate::motion::{Run, SmoothField};
-use crate::options::{Method, Options};
+use crate::options::Method;
 use crate::status::Warning;
-use crate::system::PiecewiseSystem;
 
 /// Makes the enumeration of the methods beside DOPRI5 from their table, and what builds the one that a run asks for.
 macro_rules! methods {
-    (|$options:ident, $system:ident, $span:ident| $($name:ident: $asked:pat $(if $may:expr)? => $built:expr,)*) => {
+    (|$start:ident, $span:ident| $($name:ident: $asked:pat $(if $may:expr)? => $built:expr,)*) => {
         /// The method that is asked before DOPRI5.
         pub(super) enum Chosen {
             $($name(Box<$name>)),*
         }
 
         impl Chosen {
-            /// What `options.method` stands for; `None` is DOPRI5 alone. `span` is the length of the interval of integration.
-            pub fn of_run(
-                $options: &Options,
-                $system: &dyn PiecewiseSystem,
-                $span: f64,
-            ) -> Option<Self> {
-                match $options.method {
+            /// What the options of the run stand for, which starts here; `None` is DOPRI5 alone. `span` is the length of the interval
+            /// of integration.
+            pub fn of_run($start: &Run, $span: f64) -> Option<Self> {
+                match $start.options.method {
                     $($asked $(if $may)? => Some(Chosen::$name(Box::new($built))),)*
                     Method::Auto | Method::Taylor | Method::Dopri5 => None,
                 }
@@ -150,13 +146,13 @@ macro_rules! methods {
 }
 
 /// Does the run use Taylor series?
-fn uses_series(options: &Options, system: &dyn PiecewiseSystem) -> bool {
-    options.method == Method::Taylor || system.is_analytic()
+fn uses_series(run: &Run) -> bool {
+    run.options.method == Method::Taylor || run.system.is_analytic()
 }
 
-methods! { |options, system, span|
-    Taylor: Method::Taylor | Method::Auto if uses_series(options, system) => Taylor::of_run(options, system, span),
-    Dop853: Method::Dop853 => Dop853::new(system.n_states()),
-    Midpoint: Method::Midpoint => Midpoint::new(system.n_states()),
-    Rodas5p: Method::Rodas5p => Rodas5p::new(system.n_states()),
+methods! { |start, span|
+    Taylor: Method::Taylor | Method::Auto if uses_series(start) => Taylor::of_run(start, span),
+    Dop853: Method::Dop853 => Dop853::new(start.system.n_states()),
+    Midpoint: Method::Midpoint => Midpoint::new(start.system.n_states()),
+    Rodas5p: Method::Rodas5p => Rodas5p::new(start.system.n_states()),
 }

@@ -11,13 +11,20 @@ use crate::motion::{observer, CurrentMotion, ModeField, Run, Seen, SmoothField};
 use crate::options::{Method, Options};
 use crate::powers::power;
 use crate::status::{Warning, WarningCode};
-use crate::system::{MotionJets, PiecewiseSystem};
+use crate::system::MotionJets;
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, STIFF_SERIES, TAYLOR_SHORTEST};
 
 impl Taylor {
-    /// The method of a run over an interval of length `span`.
-    pub(super) fn of_run(options: &Options, system: &dyn PiecewiseSystem, span: f64) -> Self {
-        let operations = |order| Some(system.motion_jets(&[], order)?.operations());
+    /// The method of a run over an interval of length `span`. What counts for its order are the series of the regions, without functions
+    /// that are asleep at the start.
+    pub(super) fn of_run(start: &Run, span: f64) -> Self {
+        let (system, options, motion) = (start.system, start.options, &start.motion);
+        let place = (start.t, &start.x[..], &motion.discrete[..]);
+        let awake = motion.asleep.curved_awake_at(system, place);
+        let operations = |order| {
+            let jets = system.motion_jets_of(&[], awake.as_deref(), order);
+            Some(jets?.operations())
+        };
         let order = Taylor::order_for(options.rtol, operations);
         let taylor = Taylor::new(system.n_states(), order);
         match system.hides_changes() {

@@ -5,10 +5,9 @@ use super::duties::{Attempt, ExitSeries, Ready, Stepper};
 use super::{Controller, Dopri5, ErrorScale, Interpolant, Rodas5p, Step};
 use crate::error::FieldError;
 use crate::motion::{Run, Seen, SmoothField};
-use crate::options::{Method, Options};
+use crate::options::Method;
 use crate::stats::Stats;
 use crate::status::Warning;
-use crate::system::PiecewiseSystem;
 
 /// Calls a method of the stepper in use; that of DOPRI5 is known to the compiler.
 macro_rules! of_method_in_use {
@@ -39,10 +38,10 @@ pub(crate) struct Steppers {
 
 impl Steppers {
     /// The methods of a run over an interval of length `span`.
-    pub fn new(options: &Options, system: &dyn PiecewiseSystem, span: f64) -> Self {
+    pub fn new(start: &Run, span: f64) -> Self {
         Steppers {
-            dopri5: Dopri5::new(system.n_states()),
-            chosen: Chosen::of_run(options, system, span),
+            dopri5: Dopri5::new(start.system.n_states()),
+            chosen: Chosen::of_run(start, span),
             takes_motion: false,
             takes_step: false,
         }

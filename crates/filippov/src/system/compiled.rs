@@ -31,7 +31,7 @@ pub(super) struct Model {
     pub n_states: usize,
     pub names: Names,
     backend: Backend,
-    field_program: FieldProgram,
+    pub field_program: FieldProgram,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
     single_rates: Vec<OnceLock<TieredProgram>>,
@@ -136,7 +136,7 @@ const MOST_JACOBIANS: usize = 64;
 const LARGEST_AWAITED: usize = 10_000;
 
 /// The field: every run needs it, so that it is compiled at once, unless that takes long.
-enum FieldProgram {
+pub(super) enum FieldProgram {
     Compiled(Program),
     Tiered(Box<TieredProgram>),
 }
@@ -220,7 +220,6 @@ impl Model {
     }
 
     /// The field.
-    #[inline(always)]
     pub fn field_program(&self) -> &Program {
         match &self.field_program {
             FieldProgram::Compiled(program) => program,
@@ -238,10 +237,19 @@ impl Model {
 
     /// Does one of these surfaces have a higher relative degree than 1?
     pub fn is_reducible(&self, surfaces: &[usize]) -> bool {
-        surfaces.iter().any(|&j| {
-            let find = || relative_degree(&self.graph, &self.field, j);
-            *self.relative_degrees[j].get_or_init(find) > 1
-        })
+        surfaces
+            .iter()
+            .any(|&j| match self.relative_degrees[j].get() {
+                Some(&degree) => degree > 1,
+                None => self.find_relative_degree(j) > 1,
+            })
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_relative_degree(&self, j: usize) -> usize {
+        let find = || relative_degree(&self.graph, &self.field, j);
+        *self.relative_degrees[j].get_or_init(find)
     }
 
     /// What is left of the system where a motion slides on these surfaces, if one of them has a higher relative degree.

@@ -11,7 +11,7 @@ use filippov_expr::{
 };
 use smallvec::SmallVec;
 
-use super::compiled::{Follower, Model};
+use super::compiled::{FieldProgram, Follower, Model};
 use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
@@ -180,11 +180,26 @@ impl TracedSystem {
         });
     }
 
-    /// The field where there are discrete states, or no native code: apart, so that the way without them is short.
+    /// The field where there are discrete states, or other code than one native function: apart, so that the way without them is short.
     #[cold]
     #[inline(never)]
     fn field_apart(&self, place: &Place<'_>, dx: &mut [f64]) {
         self.eval(self.model.field_program(), place, &[], dx);
+    }
+}
+
+impl TracedSystem {
+    /// What is left of the system where a motion slides on these surfaces, one of which has a higher relative degree.
+    #[cold]
+    #[inline(never)]
+    fn reduction(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
+        let make = || {
+            self.model
+                .reduced(surfaces)
+                .map(|model| self.with_model(model))
+        };
+        let reduced = self.reductions.get_or_make(surfaces, make);
+        reduced.map(|system| system as _)
     }
 }
 
@@ -253,9 +268,11 @@ impl PiecewiseSystem for TracedSystem {
     #[inline]
     fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
         let &Place { t, x, signs, q } = place;
-        let (program, p) = (self.model.field_program(), &self.parameters);
-        if !(q.is_empty() && program.eval_native(t, x, signs, p, &[], dx)) {
-            self.field_apart(place, dx);
+        let p = &self.parameters;
+        match &self.model.field_program {
+            FieldProgram::Compiled(program)
+                if q.is_empty() && program.eval_native(t, x, signs, p, &[], dx) => {}
+            _ => self.field_apart(place, dx),
         }
         Ok(())
     }
@@ -401,16 +418,10 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn reduced(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
-        if !self.model.is_reducible(surfaces) {
-            return None;
+        match self.model.is_reducible(surfaces) {
+            true => self.reduction(surfaces),
+            false => None,
         }
-        let make = || {
-            self.model
-                .reduced(surfaces)
-                .map(|model| self.with_model(model))
-        };
-        let reduced = self.reductions.get_or_make(surfaces, make);
-        reduced.map(|system| system as _)
     }
 
     fn surface_name(&self, j: usize) -> String {

@@ -60,6 +60,9 @@ pub const MOST_TOUCHES_AT_ONE_TIME: usize = 3;
 /// So many switches in one place are worth a word: a run that goes on in time makes as many in many places.
 pub const MANY_SWITCHES: u64 = 100_000;
 
+/// A run of fewer switches does not ask in which place they are.
+pub const FEW_SWITCHES: u64 = MANY_SWITCHES / 100;
+
 /// Two states are in one place if no component differs by more than this part of its size.
 pub const SAME_PLACE: f64 = 0.1;
 
