@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,9 +15,11 @@ from filippov._core import PageModel
 from filippov.app.page import Page
 from filippov.app.reply import Reply, failure, read_reply
 from filippov.app.script import write_script
+from filippov.app.sentences import branch_sentence, cycle_sentence, special_phrase
 from filippov.cycles import Branch, Cycle, continuation, equilibrium, limit_cycle
 from filippov.cycles.branch import State
 from filippov.errors import FilippovError, InputError
+from filippov.options import check_options
 from filippov.scalars import real
 
 __all__ = ["Engine"]
@@ -25,6 +28,7 @@ Array = npt.NDArray[np.float64]
 
 _CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "basins", "sample")
 _MOST_POINTS = 300
+_LOG = logging.getLogger(__name__)
 
 
 class Engine:
@@ -80,6 +84,11 @@ class Engine:
                 return self._own[kind](given).to_bytes()
         except (FilippovError, ValueError) as error:
             return failure(str(error), "argument")
+        except (
+            Exception
+        ) as error:  # a request is answered, whatever happens; a page would wait for the answer
+            _LOG.exception("the request %r failed", kind)
+            return failure(f"The kernel failed at this: {type(error).__name__}: {error}", "failed")
 
     def _with_kinds(self, kind: str, data: bytes) -> bytes:
         if kind != "describe":
@@ -105,10 +114,15 @@ class Engine:
         )
 
     def _script(self, given: Mapping[str, Any]) -> Reply:
-        page = self.page._replace(
-            rtol=_number(given, "rtol", self.page.rtol), atol=_number(given, "atol", self.page.atol)
-        )
-        text = write_script(page, self._start(given), self._span(given), self._params(given))
+        options = {
+            "rtol": _number(given, "rtol", self.page.rtol),
+            "atol": _number(given, "atol", self.page.atol),
+            "method": given.get("method") or self.page.method,
+        }
+        start = self._start(given)
+        found = check_options(options, tuple(self._span(given)), len(start))
+        page = self.page._replace(**{**options, "method": found.method})
+        text = write_script(page, start, self._span(given), self._params(given))
         return Reply({"ok": True, "kind": "script", "text": text}, {})
 
     def _cycle(self, given: Mapping[str, Any]) -> Reply:
@@ -132,7 +146,7 @@ class Engine:
             "multipliers": _pairs(found.multipliers),
             "stable": found.is_stable,
             "forced": found.is_forced,
-            "text": repr(found),
+            "text": cycle_sentence(found),
         }
         return reply._replace(header=header)
 
@@ -185,12 +199,18 @@ def _branch_reply(branch: Branch, name: str) -> Reply:
             "index": found.point,
             "value": found.params[name],
             "code": found.code,
-            "text": repr(found),
+            "text": special_phrase(found),
             "y": _place(found.state).tolist(),
         }
         for found in branch.special
     ]
-    header = {"ok": True, "kind": "continuation", "parameter": name, "special": special, "text": repr(branch)}
+    header = {
+        "ok": True,
+        "kind": "continuation",
+        "parameter": name,
+        "special": special,
+        "text": branch_sentence(branch),
+    }
     arrays = {
         "value": np.array([point.params[name] for point in branch.points]),
         "y": np.array([_place(state) for state in states]),
