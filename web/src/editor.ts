@@ -69,7 +69,11 @@ export interface EditorOptions {
   open(model: Uint8Array): void;
 }
 
-const EXAMPLE = `import numpy as np
+/** What stands in the editor before anything is written. */
+export const EXAMPLE = `import numpy as np
+
+y0 = [1.0, 2.0]
+t_span = (0, 60)
 
 def oscillator(t, x, F=0.4, omega=1/3):
     y, v = x
