@@ -261,6 +261,20 @@ def test_the_kernel_finds_the_grazing_of_an_oscillator_at_a_wall() -> None:
     assert grazing["text"].startswith("grazing of a reset at x - s = 0, at t = ")
 
 
+def test_a_branch_has_the_extents_of_its_cycles_wherever_the_run_ended() -> None:
+    def rates(t: float, x: Any, zeta: float = 0.1, omega: float = 1.5) -> Any:
+        return [x[1], np.cos(omega * t) - 2 * zeta * x[1] - x[0]]
+
+    page = make_page(fl.System(rates, states=("y", "v")), [0.2, -0.6], (0, 60))
+    t0 = 2e3 * np.pi / 1.5
+    reply = asked(Engine(page), "continuation", parameter="omega", range=[1.4, 2.0], t0=t0)
+    omega = reply.arrays["value"]
+    assert (omega.min(), omega.max()) == pytest.approx((1.4, 2.0)), "with the points that there are"
+    amplitude = 1 / np.hypot(1 - omega**2, 0.2 * omega)
+    assert np.allclose(reply.arrays["high"][:, 0], amplitude, rtol=1e-4)  # samples of a sine: 3e-5
+    assert np.allclose(reply.arrays["low"][:, 1], -omega * amplitude, rtol=1e-4)
+
+
 def test_a_request_that_fails_is_answered_too(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -49,7 +49,7 @@ export function spanOfPoints(values: Float64Array): Interval {
   return padded(low, high, 0.08);
 }
 
-const OUTLIERS = 0.02; // the share of points that may lie outside of the picture
+const OUTLIERS = 0.05; // the share of points that may lie outside of the picture
 const STRETCHED = 4; // where they would make it so many times as high
 const SAMPLE = 4000;
 

@@ -93,7 +93,7 @@ export function makeEditor(options: EditorOptions): Editor {
   area.value = options.text ?? EXAMPLE;
   const words = make("p", { class: "quiet", role: "status" });
   const go = button("Use this text", () => void use());
-  const label = make("label", { for: id }, "The right-hand side in Python");
+  const label = make("label", { for: id }, "The right-hand side in Python. Arguments with a default get a slider.");
   const element = make("div", { class: "editor" }, label, area, make("div", { class: "row" }, go, words));
   let reader: TextReader | null = null;
   let isPrepared = false;

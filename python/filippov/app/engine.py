@@ -28,6 +28,7 @@ Array = npt.NDArray[np.float64]
 
 _CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "basins", "sample")
 _MOST_POINTS = 300
+_SAMPLES = 401  # of a cycle, for its extent: to 3e-5 of the amplitude of a sine
 _LOG = logging.getLogger(__name__)
 
 
@@ -114,15 +115,12 @@ class Engine:
         )
 
     def _script(self, given: Mapping[str, Any]) -> Reply:
-        options = {
-            "rtol": _number(given, "rtol", self.page.rtol),
-            "atol": _number(given, "atol", self.page.atol),
-            "method": given.get("method") or self.page.method,
-        }
-        start = self._start(given)
-        found = check_options(options, tuple(self._span(given)), len(start))
-        page = self.page._replace(**{**options, "method": found.method})
-        text = write_script(page, start, self._span(given), self._params(given))
+        rtol, atol = _number(given, "rtol", self.page.rtol), _number(given, "atol", self.page.atol)
+        start, (t0, t1) = self._start(given), self._span(given)
+        method = given.get("method") or self.page.method
+        checked = check_options({"rtol": rtol, "atol": atol, "method": method}, (t0, t1), len(start))
+        page = self.page._replace(rtol=rtol, atol=atol, method=checked.method)
+        text = write_script(page, start, (t0, t1), self._params(given))
         return Reply({"ok": True, "kind": "script", "text": text}, {})
 
     def _cycle(self, given: Mapping[str, Any]) -> Reply:
@@ -160,7 +158,7 @@ class Engine:
         of = given.get("of", "cycle")
         start: State
         if of == "cycle":
-            start = self._found_cycle(given)
+            start = self._to_follow(given)
         elif of == "equilibrium":
             start = equilibrium(self.page.system, self._start(given), self._params(given))
         else:
@@ -173,6 +171,18 @@ class Engine:
         period = None if given.get("period") is None else _number(given, "period", 0.0)
         t0 = _number(given, "t0", self._span(given)[0])
         return limit_cycle(self.page.system, self._start(given), self._params(given), period=period, t0=t0)
+
+    def _to_follow(self, given: Mapping[str, Any]) -> Cycle:
+        """Return the cycle that a branch starts with.
+
+        At a late time the phase of a forcing turns fast with its frequency: a branch would have tiny steps.
+        """
+        found = self._found_cycle(given)
+        if not found.is_forced:
+            return found
+        period = None if given.get("period") is None else found.period
+        options: dict[str, Any] = {"period": period, "t0": 0.0, "transient": 0}
+        return limit_cycle(self.page.system, found.at(0.0), found.params, **options)
 
     def _start(self, given: Mapping[str, Any]) -> list[float]:
         if given.get("y0") is None:
@@ -231,7 +241,11 @@ def _place(state: State) -> Array:
 def _extent(state: State) -> tuple[Array, Array]:
     if not isinstance(state, Cycle):
         return state.y, state.y
-    y = state.solution.y
+    run = state.solution
+    assert run.sol is not None  # a run over one period keeps its steps
+    # Steps are long: their ends alone would miss the extremes. Both sides of a jump are ends of steps.
+    between = run.sol(np.linspace(run.t[0], run.t[-1], _SAMPLES))
+    y = np.concatenate([run.y, between], axis=1)
     return y.min(axis=1), y.max(axis=1)
 
 
