@@ -186,7 +186,7 @@ export class DiagramPanel implements Panel {
     try {
       await (state.carry ? this.carried(signal) : this.scattered(signal));
       if (this.points.length === 0)
-        this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range.");
+        this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range: choose another one beside “at”.");
     } catch (error) {
       const words = wordsOf(error);
       if (words !== null) {

@@ -542,6 +542,10 @@ export class Front {
     for (const [term, text] of rows) if (text) facts.append(make("dt", {}, term), make("dd", {}, text));
     this.editor = makeEditor({
       text: model.page.text,
+      label:
+        model.page.text === null
+          ? "This model has come without a text. Another one: the right-hand side in Python"
+          : "The right-hand side in Python",
       reader: () => (host.openModel ? host.reader() : Promise.resolve(null)),
       open: (bytes) => host.openModel?.(bytes),
     });

@@ -23,7 +23,7 @@ export function showStart(root: HTMLElement, { problems, reader, openProblem, op
   const scheme = window.matchMedia("(prefers-color-scheme: dark)");
   root.classList.add("filippov");
   applyTheme(root, scheme.matches ? DARK : LIGHT);
-  const editor = makeEditor({ text: null, reader, open: openModel });
+  const editor = makeEditor({ text: null, label: "The right-hand side in Python", reader, open: openModel });
   const rows = problems.flatMap(({ name, title, note }) => [
     make("dt", {}, button(title, () => openProblem(name))),
     make("dd", {}, note ?? ""),

@@ -67,7 +67,7 @@ _CYCLES = (
     ),
 )
 
-_STATES = ("twist", "v_upper", "v_lower")
+_STATES = ("twist", "upper", "lower")
 
 PROBLEMS = (
     *(
