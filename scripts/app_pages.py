@@ -19,6 +19,7 @@ from pathlib import Path
 from filippov import problems
 from filippov.app import make_page
 from filippov.app.files import ENGINE, FRONT, NotBuilt, front, static_folder
+from filippov.app.page import problem_rows
 from filippov.errors import ModelError
 
 BODY, SCRIPT = "<body", f'<script type="module" src="{FRONT}"></script>'
@@ -81,7 +82,7 @@ def write_pages(folder: Path) -> None:
     (folder / "index.html").write_text(index, encoding="utf-8")
     (folder / "models").mkdir()
     names = [name for name in problems.names() if _write_model(name, folder)]
-    rows = [{"name": name, "title": name.replace("_", " ")} for name in names]
+    rows = problem_rows(names)
     (folder / "models" / "index.json").write_text(json.dumps(rows), encoding="utf-8")
     lines = [OVERVIEW]
     for name in names:

@@ -14,6 +14,7 @@ from typing import Any
 
 import filippov as fl
 from filippov import _core
+from filippov.app.page import problem_rows
 
 STATIC = Path(fl.__file__).parent / "app" / "static"
 BUILT = ("index.html", "app.js", "app.css", "filippov.wasm")
@@ -80,8 +81,8 @@ def served(folder: Path) -> Iterator[str]:
             (models / f"{name}.flp").write_bytes(model_bytes(name))
         except fl.FilippovError:  # it needs Python for its runs
             continue
-        listed.append({"name": name, "title": name.replace("_", " ")})
-    (models / "index.json").write_text(json.dumps(listed), encoding="utf-8")
+        listed.append(name)
+    (models / "index.json").write_text(json.dumps(problem_rows(listed)), encoding="utf-8")
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Handler, directory=str(folder)))
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
@@ -9,12 +10,14 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+import zlib
 from pathlib import Path
 from typing import Any
 
 import filippov as fl
 import numpy as np
 import pytest
+from filippov.app import make_page, write_script
 
 from app.conftest import front, settle, wait_until
 from app.static_site import STATIC, model_bytes
@@ -360,6 +363,32 @@ def test_the_script_repeats_the_run(open_page: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(end, front(page, "run.y.slice(-2)"), atol=1e-8)
 
 
+TYPED = """
+import numpy as np
+
+def oscillator(t, x, F=0.4, omega=1/3):
+    y, v = x
+    return v, -y + np.sin(omega * t) - F * np.sign(v)
+"""
+
+
+@pytest.mark.parametrize("case", ["reference", "text", "bytes", "one state"])
+def test_the_page_and_the_kernel_write_the_same_script(open_page: Any, case: str) -> None:
+    names: dict[str, Any] = {}
+    exec(TYPED, names)
+    friction = fl.System(names["oscillator"], states=("y", "v"))
+    ramp = fl.System(lambda t, x, a=1e-5: [a - np.sign(x[0])], n=1, states=("x",))
+    shown = {
+        "reference": make_page("dry_friction", params={"F": 0.7}, axes=(0, 1)),
+        "text": make_page(friction, [1.0, -2e-7], (0, 40), text=TYPED, method="DOP853"),
+        "bytes": make_page(friction, [1.0, 2e16], (0, 4), rtol=1e-8),
+        "one state": make_page(ramp, [1 / 3]),
+    }[case]
+    link = base64.urlsafe_b64encode(zlib.compress(shown.to_bytes(), wbits=-15)).decode().rstrip("=")
+    page = open_page(f"#m={link}")
+    assert saved(page, "Python script", "py").decode() == write_script(shown)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_screen_reader_and_weak_eyes_find_no_serious_fault(open_page: Any, scheme: str) -> None:
     if not AXE.exists():
@@ -439,7 +468,8 @@ def test_a_model_is_typed_in_the_page(open_page: Any) -> None:
     page = open_page("#p=biased_relay")
     page.get_by_role("tab", name="Model").click()
     page.get_by_text("no Python runs").wait_for()
-    area = page.get_by_label("The right-hand side in Python")
+    area = page.get_by_label("the right-hand side in Python")
+    page.get_by_text("This model has come without a text").wait_for()
     area.fill("def f(t, x):\n    y, v = x\n    while v:\n        v = 0\n    return v, -y\n")
     page.get_by_role("button", name="Use this text").click()
     page.locator(".editor .wrong").wait_for()
@@ -455,6 +485,87 @@ def test_a_model_is_typed_in_the_page(open_page: Any) -> None:
     assert area.input_value() == text
     other = open_page(front(page, "fragment()"))
     assert front(other, "run.switches") == front(page, "run.switches")
+
+
+def empty_page(browser: Any, address: str, **options: Any) -> Any:
+    page = browser.new_context(**options).new_page()
+    page.goto(address)
+    page.get_by_role("heading", name="Write a system").wait_for()
+    return page
+
+
+def test_a_page_without_a_model_takes_a_text(site: str, browser: Any) -> None:
+    if not (STATIC / "filippov_text.wasm").exists():
+        pytest.skip("the reader of Python text was not built: filippov_text.wasm is missing")
+    page = empty_page(browser, site + "index.html")
+    text = page.get_by_label("The right-hand side in Python").input_value()
+    page.get_by_text("no Python runs").wait_for()
+    page.get_by_role("button", name="Use this text").click()
+    wait_until(page, "document.querySelector('#app').front")
+    settle(page)
+    assert front(page, "model.page.text") == text
+    names: dict[str, Any] = {}
+    exec(text, names)
+    native = fl.System(names["oscillator"], n=2).solve(names["t_span"], names["y0"], rtol=1e-6, atol=1e-9)
+    assert front(page, "run.switches.map(s => s.kind)") == native.switches.kind.tolist()
+    page.reload()
+    wait_until(page, "document.querySelector('#app').front")
+    assert front(page, "model.page.text") == text, "the address holds the model"
+    page.go_back()
+    page.get_by_role("heading", name="Write a system").wait_for()
+    page.context.close()
+
+
+def test_a_page_without_a_model_opens_reference_problems(site: str, browser: Any) -> None:
+    page = empty_page(browser, site)
+    rows = page.locator(".problems dt").all_inner_texts()
+    assert "welander" in rows
+    assert fl.problems.get("welander").note in page.locator(".problems").inner_text()
+    page.get_by_role("button", name="welander").click()
+    wait_until(page, "document.querySelector('#app').front")
+    assert front(page, "model.states") == ["T", "S"]
+    page.get_by_role("link", name="filippov").click()
+    page.get_by_role("heading", name="Write a system").wait_for()
+    page.context.close()
+
+
+def test_a_page_without_a_model_and_a_reader_says_so(site: str, browser: Any) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844})
+    page = context.new_page()
+    page.route("**/filippov_text.wasm", lambda route: route.abort())
+    page.goto(site)
+    page.get_by_text("This page has no reader of Python text").wait_for()
+    assert not page.get_by_role("button", name="Use this text").is_visible()
+    assert page.locator(".problems dt").count() > 10
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    context.close()
+
+
+def test_a_diagram_over_a_reciprocal(open_page: Any) -> None:
+    """Fig. 4(a) of Piiroinen and Kuznetsov (2008): v once in each period over 1/omega."""
+    page = open_page()
+    page.get_by_role("tab", name="Diagram").click()
+    fields = page.locator(".places")
+    fields.get_by_label("points", exact=True).fill("2")
+    fields.get_by_role("combobox", name="parameter").select_option("1/omega")
+    fields.get_by_label("to", exact=True).fill("7")
+    fields.get_by_label("to", exact=True).press("Enter")
+    fields.get_by_role("combobox", name="state").select_option("1")
+    settle(page)
+    assert front(page, "state.range") == pytest.approx([1 / 0.3, 1 / 7])
+    x = np.array(front(page, "panels.get('diagram').points.x.slice()"))
+    assert (x.min(), x.max()) == pytest.approx((0.3, 7))
+    assert np.allclose(np.diff(np.unique(x.round(9))), 6.7 / (len(np.unique(x.round(9))) - 1))
+    words = fields.get_by_role("status").all_inner_texts()
+    assert any("outside of the picture" in line for line in words), "the resonance at 1"
+    fields.get_by_label("from", exact=True).fill("0")
+    fields.get_by_label("from", exact=True).press("Enter")
+    assert front(page, "state.range[0]") == pytest.approx(1 / 0.3), "0 has no reciprocal"
+    canvas = page.locator(".diagram canvas")
+    size = canvas.bounding_box()
+    canvas.click(position={"x": size["width"] / 2, "y": size["height"] / 2})
+    settle(page)
+    assert 1 / front(page, "state.params.omega") == pytest.approx(3.65, abs=0.2), "what stands there"
 
 
 def test_a_page_without_the_reader_shows_the_text_and_says_so(open_page: Any) -> None:

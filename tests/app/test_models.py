@@ -210,6 +210,8 @@ def test_the_kernel_finds_the_cycle_on_the_screen() -> None:
     y = reply.arrays["y"]
     assert np.max(np.abs(y[-1] - y[0])) < 1e-6
     assert {piece["mode"] for piece in reply.header["pieces"]} == {str(mode) for mode in expected.modes}
+    modes = ", ".join(str(mode) for mode in expected.modes)
+    assert reply.header["text"] == f"A stable forced cycle of period 15.708 through the modes {modes}."
 
 
 def test_the_kernel_continues_the_cycle() -> None:
@@ -223,6 +225,11 @@ def test_the_kernel_continues_the_cycle() -> None:
     assert (reply.arrays["y"] <= reply.arrays["high"] + 1e-9).all()
     assert (reply.arrays["low"] < reply.arrays["high"]).all()
     assert {row["code"] for row in reply.header["special"]} >= {"EP"}
+    text = reply.header["text"]
+    assert text.startswith(
+        f"{len(value)} cycles for omega from 0.38 to 0.42. Below: omega = 0.38 is the end"
+    ), text
+    assert {row["text"] for row in reply.header["special"] if row["code"] == "EP"} == {"end"}
 
 
 def test_the_kernel_continues_an_equilibrium() -> None:
@@ -233,6 +240,59 @@ def test_the_kernel_continues_an_equilibrium() -> None:
     assert reply.header["ok"], reply.header
     assert np.allclose(reply.arrays["y"][:, 0], reply.arrays["value"] - 0.2)
     assert (reply.arrays["stable"] == 1).all()
+
+
+def test_the_kernel_finds_the_grazing_of_an_oscillator_at_a_wall() -> None:
+    def rates(
+        t: float, x: Any, zeta: float = 0.05, omega: float = 1.9, r: float = 0.8, s: float = -0.5
+    ) -> Any:
+        return [x[1], np.cos(omega * t) - 2 * zeta * x[1] - x[0]]
+
+    wall = fl.Reset(
+        lambda t, x, s: x[0] - s, lambda t, x, r: [x[0], -r * x[1]], direction="down", name="wall"
+    )
+    oscillator = fl.System(rates, states=("x", "v"), resets=wall)
+    page = make_page(oscillator, [0.2, -0.6], (0, 60))
+    reply = asked(Engine(page), "continuation", parameter="omega", range=[1.6, 2.0])
+    (grazing,) = (row for row in reply.header["special"] if row["code"] == "GR")
+    b = 1 - 2 * 0.05**2
+    amplitude_is_the_gap = np.sqrt(b + np.sqrt(b**2 - 1 + 4.0))
+    assert grazing["value"] == pytest.approx(amplitude_is_the_gap, rel=1e-8)
+    assert grazing["text"].startswith("grazing of a reset at x - s = 0, at t = ")
+
+
+def test_a_branch_has_the_extents_of_its_cycles_wherever_the_run_ended() -> None:
+    def rates(t: float, x: Any, zeta: float = 0.1, omega: float = 1.5) -> Any:
+        return [x[1], np.cos(omega * t) - 2 * zeta * x[1] - x[0]]
+
+    page = make_page(fl.System(rates, states=("y", "v")), [0.2, -0.6], (0, 60))
+    t0 = 2e3 * np.pi / 1.5
+    reply = asked(Engine(page), "continuation", parameter="omega", range=[1.4, 2.0], t0=t0)
+    omega = reply.arrays["value"]
+    assert (omega.min(), omega.max()) == pytest.approx((1.4, 2.0)), "with the points that there are"
+    amplitude = 1 / np.hypot(1 - omega**2, 0.2 * omega)
+    assert np.allclose(reply.arrays["high"][:, 0], amplitude, rtol=1e-4)  # samples of a sine: 3e-5
+    assert np.allclose(reply.arrays["low"][:, 1], -omega * amplitude, rtol=1e-4)
+
+
+def test_a_request_that_fails_is_answered_too(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fails(*_: Any, **__: Any) -> Any:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr("filippov.app.engine.limit_cycle", fails)
+    reply = read_reply(Engine(make_page(FRICTION, [1.0, 2.0])).answer(b'{"kind": "cycle"}'))
+    assert reply.header["ok"] is False
+    assert reply.header["error"] == "The kernel failed at this: ZeroDivisionError: by zero"
+    assert "Traceback" in caplog.text, "where it failed stands in the terminal"
+
+
+def test_the_script_has_the_method_that_was_chosen() -> None:
+    engine = Engine(make_page(FRICTION, [1.0, 2.0]))
+    assert "method='DOP853'" in asked(engine, "script", method="DOP853").header["text"]
+    refused = read_reply(engine.answer(b'{"kind": "script", "method": "x\'); import os"}'))
+    assert refused.header["ok"] is False
 
 
 @pytest.mark.parametrize(

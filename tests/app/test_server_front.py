@@ -169,8 +169,12 @@ def test_cycles_and_branches_come_from_the_kernel(at_server: Any) -> None:
     assert asked[-1]["parameter"] == "F"
     assert asked[-1]["y0"] == pytest.approx([1.0, 0.0])
     assert "LP at F" in page.locator(".branch canvas").get_attribute("aria-label")
-    page.get_by_role("slider", name="parameter F").press("ArrowRight")
+    assert "section" not in asked[-2], "the kernel needs none for a cycle"
+    row = page.locator(".special tr")
+    assert row.inner_text().split("\t") == ["LP", f"F = {asked[-1]['range'][1] * 10 / 19:.8g}", "a fold"]
+    row.get_by_role("button").click()
     settle(page)
+    assert front(page, "state.params.F") == pytest.approx(asked[-1]["range"][1] * 10 / 19)
     assert front(page, "motion.cycle") is None, "it was that of other parameters"
 
 

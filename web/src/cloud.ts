@@ -49,6 +49,20 @@ export function spanOfPoints(values: Float64Array): Interval {
   return padded(low, high, 0.08);
 }
 
+const OUTLIERS = 0.05; // the share of points that may lie outside of the picture
+const STRETCHED = 4; // where they would make it so many times as high
+const SAMPLE = 4000;
+
+/** The interval of most points along one axis: a few that lie far away, as near a resonance, do not flatten the rest. */
+export function spanOfMost(values: Float64Array): Interval {
+  const whole = spanOfPoints(values);
+  const stride = Math.max(1, Math.floor(values.length / SAMPLE));
+  const sorted = Float64Array.from({ length: Math.ceil(values.length / stride) }, (_, k) => values[k * stride]).sort();
+  const at = (share: number) => sorted[Math.round(share * (sorted.length - 1))];
+  const most = padded(at(OUTLIERS / 2), at(1 - OUTLIERS / 2), 0.25);
+  return whole[1] - whole[0] > STRETCHED * (most[1] - most[0]) ? most : whole;
+}
+
 function drawDots(pen: Pen, points: Points, frame: Frame, theme: Theme): void {
   pen.save();
   clipTo(pen, frame);

@@ -5,12 +5,12 @@ import { labelled } from "./controls.ts";
 import { button, make, select } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
-import { motionRequest, rangeOf, sectionRequest } from "./model.ts";
+import { motionRequest, rangeOf } from "./model.ts";
 import { showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { engineFor } from "./pool.ts";
-import { coordinateField, fieldsForm, parameterField, rangeFields, sectionFields } from "./sections.ts";
+import { coordinateField, fieldsForm, parameterField, rangeFields } from "./sections.ts";
 import { toBranch, toCycle, type Branch } from "./replies.ts";
 
 export class CyclesPanel implements Panel {
@@ -21,6 +21,7 @@ export class CyclesPanel implements Panel {
   private readonly canFollow: boolean;
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly branchWords = make("p", { class: "quiet", role: "status" });
+  private readonly special = make("table", { class: "special" });
   private readonly multipliers = make("p", { class: "row quiet" });
   private readonly go = button("Find the cycle that this run leads to", () =>
     this.press(this.go, (signal) => this.find(signal)),
@@ -50,6 +51,7 @@ export class CyclesPanel implements Panel {
       this.multipliers,
       this.canFollow ? this.followForm : null,
       this.branchWords,
+      this.canFollow ? this.special : null,
       this.canFollow ? this.picture.element : null,
     );
     this.picture.say("A branch is drawn here: cycles by the least and the greatest value of a state.");
@@ -57,10 +59,7 @@ export class CyclesPanel implements Panel {
 
   show(): void {
     const { model, state } = this.context;
-    this.findForm.replaceChildren(
-      this.go,
-      sectionFields(model, state, () => undefined),
-    );
+    this.findForm.replaceChildren(this.go);
     if (!this.canFollow) return;
     const followed = [
       ["cycle", "the cycle"],
@@ -75,7 +74,7 @@ export class CyclesPanel implements Panel {
         state.range = rangeOf(model, name, state.params[name]);
         this.show();
       }),
-      ...rangeFields(state, (range) => (state.range = range)),
+      ...rangeFields(state.range ?? [0, 1], (range) => (state.range = range)),
       coordinateField("drawn by", model, state, () => this.picture.redraw()),
       this.follow,
     );
@@ -150,8 +149,7 @@ export class CyclesPanel implements Panel {
     if (engine === null) return;
     this.words.textContent = "The kernel is looking for it.";
     try {
-      const section = state.section === null ? {} : { section: sectionRequest(state.section, state.params) };
-      const request = { kind: "cycle", ...motionRequest(state), ...this.context.end(), ...section };
+      const request = { kind: "cycle", ...motionRequest(state), ...this.context.end() };
       const cycle = toCycle(await engine.ask(request, signal));
       this.start = { t0: cycle.run.t[0], y0: [...cycle.run.y.subarray(0, cycle.run.n)] };
       this.foundFor = this.motionKey();
@@ -176,17 +174,26 @@ export class CyclesPanel implements Panel {
       const start = this.start ?? this.context.end();
       const request = { kind: "continuation", ...motionRequest(state), ...start, parameter, range, of: this.of };
       this.branch = toBranch(await engine.ask(request, signal));
-      const special = this.branch.special.map(
-        ({ code, value, text }) => `${code} at ${showName(this.branch!.parameter)} = ${showNumber(value, 5)}, ${text}`,
-      );
-      this.branchWords.textContent = [this.branch.text, ...special].join(" · ");
+      this.branchWords.textContent = this.branch.text;
+      this.special.replaceChildren(...this.specialRows(this.branch));
       this.picture.say(this.branch.value.length === 0 ? "The branch has no points." : null);
     } catch (error) {
       this.branch = null;
       this.branchWords.textContent = "";
+      this.special.replaceChildren();
       this.picture.say(wordsOf(error) ?? "Stopped.");
     }
     this.picture.redraw();
+  }
+
+  /** A row for each special point; a press takes its value of the parameter over into the pictures above. */
+  private specialRows({ parameter, special }: Branch): HTMLElement[] {
+    return special.map(({ code, value, text }) => {
+      const adopt = () => this.context.setParameter(parameter, value);
+      const at = button(`${showName(parameter)} = ${showNumber(value, 8)}`, adopt, "set the parameter to this value");
+      const cells = [make("td", {}, at), make("td", {}, text.replaceAll(" - ", " − "))];
+      return make("tr", {}, make("th", { scope: "row" }, code), ...cells);
+    });
   }
 
   private data(): BranchData {

@@ -2,14 +2,14 @@
 
 import type { Frame, Interval } from "./axes.ts";
 import { padded } from "./axes.ts";
-import { drawCloud, plotWidth, spanOfPoints, type CloudData } from "./cloud.ts";
+import { drawCloud, plotWidth, spanOfMost, spanOfPoints, type CloudData } from "./cloud.ts";
 import { Points } from "./counts.ts";
 import { button, make } from "./dom.ts";
 import type { Request } from "./engine.ts";
 import { pointsCsv } from "./export.ts";
 import { Job } from "./job.ts";
-import { longSpan, motionRequest, rangeOf, sweptSection } from "./model.ts";
-import { count, showNumber } from "./numbers.ts";
+import { hasReciprocal, longSpan, motionRequest, rangeOf, reciprocalRange, sweptSection } from "./model.ts";
+import { count, showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { askAll } from "./pool.ts";
@@ -17,6 +17,7 @@ import { toDiagramPart } from "./replies.ts";
 import {
   coordinateField,
   fieldsForm,
+  overName,
   parameterField,
   rangeFields,
   returnsFields,
@@ -28,6 +29,7 @@ import { chunks, coarseToFine, evenly } from "./sweep.ts";
 const [FEWEST_VALUES, MOST_VALUES] = [200, 960];
 const CHUNK = 6;
 
+/** A part of the plane of the diagram: of what stands on the axes. */
 interface Window {
   readonly range: readonly [number, number];
   readonly up: Interval | null;
@@ -40,6 +42,7 @@ export class DiagramPanel implements Panel {
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly go = button("Draw", () => (this.job.isRunning ? this.job.stop() : this.begin()));
   private readonly back = button("Zoom out", () => this.zoomOut());
+  private readonly all = button("Show all", () => this.showAll());
   private readonly points = new Points();
   private readonly earlier: Window[] = [];
   private ends: readonly HTMLElement[] = [];
@@ -61,17 +64,20 @@ export class DiagramPanel implements Panel {
       () => this.sentence(),
     );
     this.back.hidden = true;
+    this.all.hidden = true;
     this.element = make(
       "div",
       { class: "panel" },
       this.form,
-      make("div", { class: "row" }, this.go, this.back, this.words),
+      make("div", { class: "row" }, this.go, this.back, this.all, this.words),
       this.picture.element,
     );
     this.listen();
   }
 
   show(): void {
+    const { state } = this.context;
+    if (state.range !== null && !hasReciprocal(state.range)) state.reciprocal = false;
     this.form.replaceChildren(...this.fields());
     if (this.points.length === 0 && !this.job.isRunning) this.begin();
   }
@@ -112,7 +118,7 @@ export class DiagramPanel implements Panel {
     return [
       {
         name: "diagram",
-        text: () => pointsCsv([state.parameter ?? "", model.states[state.coordinate]], [this.points.x, this.points.y]),
+        text: () => pointsCsv([`${state.reciprocal ? "1/" : ""}${state.parameter}`, model.states[state.coordinate]], [this.points.x, this.points.y]),
       },
     ];
   }
@@ -125,12 +131,17 @@ export class DiagramPanel implements Panel {
       state.carry = carry.checked;
       changed();
     });
-    this.ends = rangeFields(state, (range) => this.setWindow({ range, up: null }));
+    const accept = (range: [number, number]) => range[0] !== range[1] && (!state.reciprocal || hasReciprocal(range));
+    this.ends = rangeFields(this.range(), (range) => this.setWindow({ range, up: null }), accept);
+    const chosen = (name: string) => {
+      this.earlier.length = 0;
+      const range = rangeOf(model, name, state.params[name]);
+      state.range = state.reciprocal ? reciprocalRange(range, state.params[name]) : range;
+      this.form.replaceChildren(...this.fields());
+      this.setWindow({ range: this.range(), up: null });
+    };
     return [
-      parameterField(model, state, (name) => {
-        this.earlier.length = 0;
-        this.setWindow({ range: rangeOf(model, name, state.params[name]), up: null });
-      }),
+      parameterField(model, state, chosen, true),
       ...this.ends,
       coordinateField("of", model, state, () => {
         this.up = null;
@@ -149,7 +160,7 @@ export class DiagramPanel implements Panel {
 
   /** Values between those that are there: a part of the range is looked at more closely. */
   private refine(): void {
-    const [low, high] = this.context.state.range!;
+    const [low, high] = this.range();
     if (this.drawnFor === this.motionKey()) this.points.keepWithin(Math.min(low, high), Math.max(low, high));
     else this.points.clear();
     void this.job.start((signal) => this.compute(signal));
@@ -175,7 +186,7 @@ export class DiagramPanel implements Panel {
     try {
       await (state.carry ? this.carried(signal) : this.scattered(signal));
       if (this.points.length === 0)
-        this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range.");
+        this.picture.say(this.firstFailure() ?? "There are no returns to this section in this range: choose another one beside “at”.");
     } catch (error) {
       const words = wordsOf(error);
       if (words !== null) {
@@ -191,7 +202,7 @@ export class DiagramPanel implements Panel {
 
   /** Values in any order, in as many workers as there are. */
   private async scattered(signal: AbortSignal): Promise<void> {
-    const values = coarseToFine(evenly(this.context.state.range!, this.total));
+    const values = coarseToFine(this.values());
     const requests = chunks(values, CHUNK).map((part) => this.request(part, this.context.state.y0));
     await askAll(
       this.context.engines.many(),
@@ -205,13 +216,30 @@ export class DiagramPanel implements Panel {
   private async carried(signal: AbortSignal): Promise<void> {
     const { state, engines } = this.context;
     let start = [...state.y0];
-    for (const part of chunks(evenly(state.range!, this.total), CHUNK)) {
+    for (const part of chunks(this.values(), CHUNK)) {
       const request = this.request(part, start);
       const found = toDiagramPart(await engines.many()[0].ask(request, signal));
       signal.throwIfAborted();
       if (found.end && found.end.every(Number.isFinite)) start = [...found.end];
       this.take(found, request);
     }
+  }
+
+  /** What stands on the axis for a value of the parameter, and the value for what stands there: each way the same. */
+  private onAxis(value: number): number {
+    return this.context.state.reciprocal ? 1 / value : value;
+  }
+
+  /** The range along the axis. */
+  private range(): [number, number] {
+    const [from, to] = this.context.state.range ?? [0, 1];
+    const tidy = (value: number) => Number(this.onAxis(value).toPrecision(15));
+    return [tidy(from), tidy(to)];
+  }
+
+  /** The values of the parameter, evenly along the axis. */
+  private values(): number[] {
+    return evenly(this.range(), this.total).map((value) => this.onAxis(value));
   }
 
   private request(values: readonly number[], y0: readonly number[]): Request {
@@ -232,7 +260,10 @@ export class DiagramPanel implements Panel {
   }
 
   private take(part: ReturnType<typeof toDiagramPart>, request: Request): void {
-    this.points.add(part.value, part.y);
+    this.points.add(
+      part.value.map((value) => this.onAxis(value)),
+      part.y,
+    );
     for (const { value, message } of part.failures) this.failed.set(value, message);
     this.done += (request.values as number[]).length;
     this.tell();
@@ -242,25 +273,29 @@ export class DiagramPanel implements Panel {
   private tell(isOver = false): void {
     const { state } = this.context;
     const parts = [
-      `${this.points.length.toLocaleString("en")} points, ${this.done} of ${this.total} values of ${state.parameter}`,
+      `${this.points.length.toLocaleString("en")} points, ${this.done} of ${this.total} values of ${showName(state.parameter ?? "")}`,
     ];
     if (this.failed.size) parts.push(`${count(this.failed.size, "value")} without an end: ${this.firstFailure()}`);
+    const outside = this.outside();
+    this.all.hidden = outside === 0;
+    if (isOver && outside > 0) parts.push(`${count(outside, "point")} outside of the picture`);
     if (isOver && this.points.length) parts.push("drag a rectangle to look closer");
     this.words.textContent = parts.join(" · ");
   }
 
   private firstFailure(): string | null {
     for (const [value, message] of this.failed)
-      return Number.isNaN(value) ? message : `at ${this.context.state.parameter} = ${showNumber(value)}: ${message}`;
+      return Number.isNaN(value) ? message : `at ${showName(this.context.state.parameter ?? "")} = ${showNumber(value)}: ${message}`;
     return null;
   }
 
   private setWindow({ range, up }: Window, isPart = false): void {
     const { state } = this.context;
     if (range[0] === range[1]) return;
-    state.range = [range[0], range[1]];
+    state.range = [this.onAxis(range[0]), this.onAxis(range[1])];
     this.up = up;
     for (const [k, label] of this.ends.entries()) label.querySelector("input")!.value = showPlain(range[k], range);
+    this.all.hidden = true;
     this.back.hidden = this.earlier.length === 0;
     if (isPart) this.refine();
     else this.begin();
@@ -271,17 +306,33 @@ export class DiagramPanel implements Panel {
     if (before) this.setWindow(before);
   }
 
+  /** The axis upwards as high as all points need. */
+  private showAll(): void {
+    this.earlier.push({ range: this.range(), up: this.up });
+    this.back.hidden = false;
+    this.up = spanOfPoints(this.points.y);
+    this.tell(true);
+    this.picture.redraw();
+  }
+
+  /** How many points lie above or below the picture, where nobody has chosen a part of it. */
+  private outside(): number {
+    if (this.up !== null || this.points.length === 0) return 0;
+    const [low, high] = spanOfMost(this.points.y);
+    return this.points.y.reduce((n, value) => n + (value < low || value > high ? 1 : 0), 0);
+  }
+
   private data(): CloudData {
     const { points } = this;
     const { model, state } = this.context;
-    const range = state.range ?? [0, 1];
+    const range = this.range();
     const low = Math.min(...range);
     const high = Math.max(...range);
-    const here = state.parameter === null ? null : state.params[state.parameter];
+    const here = state.parameter === null ? null : this.onAxis(state.params[state.parameter]);
     return {
       points,
-      box: { x: [low, high], y: this.up ?? (points.length ? spanOfPoints(points.y) : padded(-1, 1, 0)) },
-      labels: [state.parameter ?? "", model.states[state.coordinate]],
+      box: { x: [low, high], y: this.up ?? (points.length ? spanOfMost(points.y) : padded(-1, 1, 0)) },
+      labels: [overName(state), model.states[state.coordinate]],
       resolution: this.picture.resolution,
       choice: this.choice,
       line: here,
@@ -325,8 +376,7 @@ export class DiagramPanel implements Panel {
   }
 
   private zoomTo(frame: Frame, choice: NonNullable<CloudData["choice"]>): void {
-    const { state } = this.context;
-    this.earlier.push({ range: state.range!, up: this.up });
+    this.earlier.push({ range: this.range(), up: this.up });
     const sorted = (a: number, b: number): [number, number] => (a < b ? [a, b] : [b, a]);
     const isFlat = Math.abs(choice.y[1] - choice.y[0]) < 8;
     const range = sorted(frame.x.back(choice.x[0]), frame.x.back(choice.x[1]));
@@ -340,7 +390,8 @@ export class DiagramPanel implements Panel {
   private adopt(value: number): void {
     const { state } = this.context;
     if (state.parameter === null || state.range === null) return;
-    this.context.setParameter(state.parameter, Number(showPlain(value, state.range)));
+    const shown = Number(showPlain(value, this.range()));
+    this.context.setParameter(state.parameter, this.onAxis(shown));
   }
 
   /** All that the diagram depends on and that is not among its own fields. */
@@ -352,9 +403,9 @@ export class DiagramPanel implements Panel {
 
   private sentence(): string {
     const { model, state } = this.context;
-    const [low, high] = state.range ?? [0, 1];
+    const [low, high] = this.range();
     return (
-      `Diagram of ${model.states[state.coordinate]} ${showSection(state.section)} over ${state.parameter} ` +
+      `Diagram of ${model.states[state.coordinate]} ${showSection(state.section)} over ${overName(state)} ` +
       `from ${showNumber(low, 5)} to ${showNumber(high, 5)}: ${count(this.points.length, "point")}, ${this.done} of ${this.total} values.`
     );
   }

@@ -63,13 +63,19 @@ export function toModel(reply: Uint8Array): Uint8Array {
 
 export interface EditorOptions {
   readonly text: string | null;
+  /** What stands above the text. */
+  readonly label: string;
   /** The reader, or `null` where the page has none. */
   reader(): Promise<TextReader | null>;
   /** Open a model that was read. */
   open(model: Uint8Array): void;
 }
 
-const EXAMPLE = `import numpy as np
+/** What stands in the editor before anything is written. */
+export const EXAMPLE = `import numpy as np
+
+y0 = [1.0, 2.0]
+t_span = (0, 60)
 
 def oscillator(t, x, F=0.4, omega=1/3):
     y, v = x
@@ -89,7 +95,7 @@ export function makeEditor(options: EditorOptions): Editor {
   area.value = options.text ?? EXAMPLE;
   const words = make("p", { class: "quiet", role: "status" });
   const go = button("Use this text", () => void use());
-  const label = make("label", { for: id }, "The right-hand side in Python");
+  const label = make("label", { for: id }, `${options.label}. Arguments with a default get a slider.`);
   const element = make("div", { class: "editor" }, label, area, make("div", { class: "row" }, go, words));
   let reader: TextReader | null = null;
   let isPrepared = false;

@@ -137,6 +137,12 @@ export class Front {
     return this.state;
   }
 
+  /** Start and time, as far as the user has changed them: the next model begins with them. */
+  get ownStart(): Partial<Pick<State, "y0" | "t_span">> {
+    const isOwn = (name: "y0" | "t_span") => this.state[name].some((value, k) => value !== this.model.page[name][k]);
+    return { ...(isOwn("y0") && { y0: this.state.y0 }), ...(isOwn("t_span") && { t_span: this.state.t_span }) };
+  }
+
   /** The run on the screen. */
   get run(): Run | null {
     return this.motion.run;
@@ -219,7 +225,7 @@ export class Front {
     const title = plain(model.page.title) === plain(host.problem) ? "" : model.page.title;
     const known = host.problems.map((problem) => [problem.name, problem.title] as const);
     const isKnown = host.problem !== null && known.some(([name]) => name === host.problem);
-    const own = isKnown ? [] : ([["", host.problem ?? "this model"]] as const);
+    const own = isKnown ? [] : ([["", host.problem ?? (plain(model.page.title) || "a model of your own")]] as const);
     const choice =
       host.openProblem && known.length > 1
         ? select("model", [...own, ...known], isKnown ? host.problem! : "", (chosen) => host.openProblem!(chosen))
@@ -233,9 +239,9 @@ export class Front {
     return make(
       "header",
       {},
-      make("h1", {}, "filippov"),
+      make("h1", {}, host.address === null ? "filippov" : make("a", { href: "index.html" }, "filippov")),
       choice,
-      make("p", { class: "title" }, title || (choice ? "" : "a model of your own")),
+      isKnown || !choice ? make("p", { class: "title" }, title || (choice ? "" : "a model of your own")) : null,
       this.notice,
       make("nav", { "aria-label": "share and save" }, share, this.buildMenu(), theme),
     );
@@ -299,7 +305,7 @@ export class Front {
           "div",
           { class: "file" },
           make("span", {}, "Python script"),
-          file("py", () => void this.script().then((text) => save(this.fileName("run", "py"), text, "text/x-python"))),
+          file("py", () => this.saveScript()),
         ),
       );
     };
@@ -318,16 +324,16 @@ export class Front {
     return `${this.host.problem ?? "filippov"}_${name.replaceAll(" ", "_")}.${kind}`;
   }
 
-  /** The kernel knows where its system comes from; without one the page writes what it has. */
+  /** The script: of the page where it holds the model, else of the kernel, which knows where its system comes from. */
   private async script(): Promise<string> {
     const engine = engineFor(this.engines, "script");
-    if (engine === null) return writeScript(this.model, this.state, this.host.bytes);
-    try {
-      return String((await engine.ask({ kind: "script", ...motionRequest(this.state) })).header.text);
-    } catch (error) {
-      this.say((error as Error).message);
-      return writeScript(this.model, this.state, this.host.bytes);
-    }
+    if (engine === null) return writeScript(this.model, this.state, this.host.bytes ?? new Uint8Array());
+    return String((await engine.ask({ kind: "script", ...motionRequest(this.state) })).header.text);
+  }
+
+  private saveScript(): void {
+    const write = (text: string) => save(this.fileName("run", "py"), text, "text/x-python");
+    void this.script().then(write, (error: Error) => this.say(error.message));
   }
 
   private buildControls(): HTMLElement {
@@ -536,6 +542,10 @@ export class Front {
     for (const [term, text] of rows) if (text) facts.append(make("dt", {}, term), make("dd", {}, text));
     this.editor = makeEditor({
       text: model.page.text,
+      label:
+        model.page.text === null
+          ? "This model has come without a text. Another one: the right-hand side in Python"
+          : "The right-hand side in Python",
       reader: () => (host.openModel ? host.reader() : Promise.resolve(null)),
       open: (bytes) => host.openModel?.(bytes),
     });

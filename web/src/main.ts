@@ -7,7 +7,8 @@ import { makeTextReader, type TextReader } from "./editor.ts";
 import { Front, type Host } from "./front.ts";
 import { describe, toDescription, type Description, type State } from "./model.ts";
 import { makeEngines, single, type Engines } from "./pool.ts";
-import { fromBase64, readFragment, toState } from "./share.ts";
+import { fromBase64, readFragment, toState, writeFragment } from "./share.ts";
+import { showStart, type Problem } from "./start.ts";
 import { applyTheme, DARK, LIGHT } from "./theme.ts";
 import { EngineError } from "./wire.ts";
 
@@ -38,25 +39,19 @@ export function complain(element: HTMLElement, error: unknown): void {
   element.replaceChildren(words);
 }
 
-interface Problem {
-  readonly name: string;
-  readonly title: string;
-}
-
 /** Start on a page: what to show is in the fragment, in the page, or with the local server. */
 export async function boot(element: HTMLElement): Promise<void> {
   const home = location.hash; // of the model that the page was opened with
-  let front: Front | null = null;
+  const shown = element as HTMLElement & { front?: Front | null };
   const open = async () => {
     try {
-      const made = await fromAddress(element, home, (again) => void again().catch((error) => complain(element, error)));
-      front?.close();
-      front = made();
-      document.title = front.title;
-      Object.assign(element, { front });
+      const made = await fromAddress(shown, home);
+      shown.front?.close();
+      shown.front = made();
+      document.title = shown.front?.title ?? "filippov";
     } catch (error) {
-      front?.close();
-      front = null;
+      shown.front?.close();
+      shown.front = null;
       complain(element, error);
     }
   };
@@ -66,49 +61,41 @@ export async function boot(element: HTMLElement): Promise<void> {
 
 /** Make the engines of a model, and what puts its front into the page. */
 type Show = (bytes: Uint8Array, problem: string | null, kernel?: Engine | null) => Promise<Make>;
-/** Put the front into the page, with the view of the link or another one. */
-type Make = (view?: unknown) => Front;
-type Open = (again: () => Promise<void>) => void;
+/** Put the front into the page; `null` if there is no model to show. */
+type Make = () => Front | null;
 
 /** All that is needed for a front; it is put into the element by the function returned, when all has come. */
-async function fromAddress(element: HTMLElement, home: string, run: Open): Promise<Make> {
+async function fromAddress(element: HTMLElement & { front?: Front | null }, home: string): Promise<Make> {
   const fragment = await readFragment(location.hash);
   const problems = await fetchProblems();
   const goTo = (hash: string) => {
     location.hash = hash;
   };
-  const common = {
-    problems,
-    address: location.href.split("#")[0],
-    openProblem: (name: string) => goTo(name === "" ? home : `p=${encodeURIComponent(name)}`),
-    reader: fetchReader,
+  const openProblem = (name: string) => goTo(name === "" ? home : `p=${encodeURIComponent(name)}`);
+  /** A model that was read goes into the address: a reload shows it again, and the way back leads to what was before. */
+  const openModel = (model: Uint8Array) => {
+    const view = element.front ? { ...element.front.ownStart, place: "model" } : null;
+    void writeFragment({ model }, view).then(goTo);
   };
+  const common = { problems, address: location.href.split("#")[0], openProblem, openModel, reader: fetchReader };
   const show: Show = async (bytes, problem, kernel = null) => {
     const engines = await makeEngines(await fetchModule(), bytes, kernel);
     const model = await describe(engines.quick);
     const { reference } = model.page;
     const known = problem ?? (problems.some(({ name }) => name === reference) ? reference : null);
-    const openModel = (read: Uint8Array) =>
-      run(async () => {
-        const before = (element as { front?: Front }).front;
-        const next = await show(read, null);
-        const view = before && { y0: before.view.y0, t_span: before.view.t_span, place: "model" };
-        before?.close();
-        history.replaceState(null, "", location.href.split("#")[0]);
-        Object.assign(element, { front: next(view) });
-      });
-    const host = { ...common, bytes, problem: known, openModel };
-    return (view = fragment.view) => mount(element, { engine: engines, model, state: view, host });
+    const host = { ...common, bytes, problem: known };
+    return () => mount(element, { engine: engines, model, state: fragment.view, host });
   };
 
   if (fragment.model) return await show(fragment.model, null);
   if (fragment.problem) return await show(await fetchProblem(fragment.problem), fragment.problem);
   if (fragment.token !== null) return await fromServer(element, fragment.token, show);
-  const name = document.body.dataset.problem ?? problems[0]?.name;
+  const name = document.body.dataset.problem;
   if (name !== undefined) return await show(await fetchProblem(name), name);
-  throw new Error(
-    "This page was opened without a model. Open it by `filippov app MODEL.py`, or by a link that carries one.",
-  );
+  return () => {
+    showStart(element, { problems, reader: fetchReader, openProblem, openModel });
+    return null;
+  };
 }
 
 async function fromServer(element: HTMLElement, token: string, show: Show): Promise<Make> {

@@ -57,6 +57,8 @@ export interface State {
   range: [number, number] | null;
   coordinate: number;
   carry: boolean;
+  /** Whether the diagram is drawn over the reciprocal of the parameter; `range` has values of the parameter. */
+  reciprocal: boolean;
 }
 
 const NO_PAGE: Page = {
@@ -117,6 +119,7 @@ export function initialState(model: Description): State {
     range: first ? rangeOf(model, first.name, first.value) : null,
     coordinate: 0,
     carry: false,
+    reciprocal: false,
   };
 }
 
@@ -138,6 +141,16 @@ export function rangeOf(model: Description, name: string, value: number): [numbe
   if (given) return [Math.min(given[0], value), Math.max(given[1], value)];
   if (value === 0) return [-1, 1];
   return value > 0 ? [0, 3 * value] : [3 * value, 0];
+}
+
+/** A range in which the parameter has a reciprocal: the model's if it can be, or one up to three times that of the value. */
+export function reciprocalRange(range: readonly [number, number], value: number): [number, number] {
+  if (hasReciprocal(range)) return [range[1], range[0]];
+  return [10 * (value || 1), (value || 1) / 3];
+}
+
+export function hasReciprocal([from, to]: readonly [number, number]): boolean {
+  return from * to > 0;
 }
 
 /** The range of a slider of an initial state. */

@@ -187,6 +187,8 @@ export function toCycle(reply: Reply): Cycle {
   };
 }
 
+const END = "EP"; // the ends of a branch: its sentence has them
+
 export function toBranch(reply: Reply): Branch {
   const y = reply.table("y");
   const optional = (name: string) => (reply.has(name) ? reply.table(name).data : null);
@@ -198,7 +200,7 @@ export function toBranch(reply: Reply): Branch {
     low: optional("low"),
     high: optional("high"),
     stable: reply.table("stable").data,
-    special: (reply.header.special ?? []) as Branch["special"],
+    special: ((reply.header.special ?? []) as Branch["special"]).filter(({ code }) => code !== END),
     text: String(reply.header.text ?? ""),
   };
 }

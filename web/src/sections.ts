@@ -5,6 +5,8 @@ import { labelled, numberField } from "./controls.ts";
 import { showExpression, showName } from "./numbers.ts";
 import { frequencyOf, type Description, type Section, type State } from "./model.ts";
 
+const INVERSE = "1/";
+
 /** The fields of a section; `changed` is called after each change. */
 export function sectionFields(model: Description, state: State, changed: () => void): HTMLElement {
   const element = make("span", { class: "fields" });
@@ -51,25 +53,49 @@ export function returnsFields(state: State, changed: () => void): HTMLElement[] 
   ];
 }
 
-export function parameterField(model: Description, state: State, changed: (name: string) => void): HTMLElement {
+/** The parameter; with `reciprocals` its reciprocal can be chosen too, as 1/omega for a frequency. */
+export function parameterField(
+  model: Description,
+  state: State,
+  changed: (name: string) => void,
+  reciprocals = false,
+): HTMLElement {
   const names = model.params.map(({ name }) => [name, showName(name)] as const);
+  const inverse = names.map(([name, text]) => [`${INVERSE}${name}`, `${INVERSE}${text}`] as const);
+  const chosen = (reciprocals && state.reciprocal ? INVERSE : "") + (state.parameter ?? "");
   return labelled(
     "over",
-    select("parameter", names, state.parameter ?? "", (name) => {
-      state.parameter = name;
-      changed(name);
+    select("parameter", reciprocals ? [...names, ...inverse] : names, chosen, (key) => {
+      state.reciprocal = key.startsWith(INVERSE);
+      state.parameter = state.reciprocal ? key.slice(INVERSE.length) : key;
+      changed(state.parameter);
     }),
   );
 }
 
-/** The two ends of the range of the parameter. */
-export function rangeFields(state: State, changed: (range: [number, number]) => void): [HTMLElement, HTMLElement] {
+/** What the diagram is drawn over, in letters: `omega` or `1/omega`. */
+export function overName({ parameter, reciprocal }: State): string {
+  return reciprocal ? `${INVERSE}${showName(parameter ?? "")}` : (parameter ?? "");
+}
+
+/** The two ends of a range; `accept` tells whether one may be taken. */
+export function rangeFields(
+  range: readonly [number, number],
+  changed: (range: [number, number]) => void,
+  accept: (range: [number, number]) => boolean = () => true,
+): [HTMLElement, HTMLElement] {
+  const ends: [number, number] = [...range];
+  const withEnd = (k: 0 | 1, value: number): [number, number] => (k === 0 ? [value, ends[1]] : [ends[0], value]);
   const field = (k: 0 | 1) =>
-    numberField(k === 0 ? "from" : "to", state.range?.[k] ?? k, (value) => {
-      const range: [number, number] = [...(state.range ?? [0, 1])];
-      range[k] = value;
-      changed(range);
-    });
+    numberField(
+      k === 0 ? "from" : "to",
+      ends[k],
+      (value) => {
+        ends[k] = value;
+        changed([...ends]);
+      },
+      (value) => accept(withEnd(k, value)),
+    );
   return [field(0), field(1)];
 }
 

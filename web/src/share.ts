@@ -1,7 +1,7 @@
 /** Links that carry a model and a view in the fragment: nothing is sent to a server. */
 
 import type { Description, State } from "./model.ts";
-import { initialState, PLACES } from "./model.ts";
+import { hasReciprocal, initialState, PLACES } from "./model.ts";
 
 /** What the fragment of an address holds. */
 export interface Fragment {
@@ -159,6 +159,7 @@ export function toState(model: Description, view: unknown): State {
     if (isNumber(value) && value >= 0) state[name] = Math.round(value);
   }
   if (typeof given.carry === "boolean") state.carry = given.carry;
+  state.reciprocal = given.reciprocal === true && state.range !== null && hasReciprocal(state.range);
   state.section = toSection(model, given.section) ?? state.section;
   return state;
 }

@@ -1,3 +1,4 @@
+import { spanOfMost, spanOfPoints } from "../src/cloud.ts";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { frameIn } from "../src/axes.ts";
@@ -48,4 +49,14 @@ test("shade grows with the count, and a single point can be seen", () => {
   assert.ok(opacity[1] > 80 && opacity[1] < opacity[2] && opacity[2] < opacity[3], opacity.join(" "));
   assert.deepEqual([...pixels.slice(4, 7)], [16, 32, 48]);
   assert.deepEqual(readColour("#d55e00"), [213, 94, 0]);
+});
+
+test("a few points far away do not flatten the picture, points that are many do", () => {
+  const near = Float64Array.from({ length: 1000 }, (_, k) => Math.sin(k));
+  assert.deepEqual(spanOfMost(near), spanOfPoints(near));
+  const withPeak = near.map((value, k) => (k % 100 === 0 ? 1000 : value));
+  const [low, high] = spanOfMost(withPeak);
+  assert.ok(low < -1 && low > -3 && high > 1 && high < 3);
+  const withMany = near.map((value, k) => (k % 5 === 0 ? 1000 : value));
+  assert.deepEqual(spanOfMost(withMany), spanOfPoints(withMany));
 });

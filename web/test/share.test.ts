@@ -65,7 +65,12 @@ test("of a foreign view only what fits the model is taken", () => {
     section: { by: "surface", surface: "no such" },
     kept: [[1, 2], [1], "x"],
     coordinate: 5,
+    parameter: "omega",
+    range: [0, 2],
+    reciprocal: true, // of a range with 0 in it
   });
   const plain = initialState(model);
-  assert.deepEqual(state, { ...plain, params: { F: 0.4, omega: 3 }, kept: [[1, 2]] });
+  const own = { params: { F: 0.4, omega: 3 }, kept: [[1, 2]], parameter: "omega", range: [0, 2] };
+  assert.deepEqual(state, { ...plain, ...own });
+  assert.ok(toState(model, { parameter: "omega", range: [3, 0.1], reciprocal: true }).reciprocal);
 });

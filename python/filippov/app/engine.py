@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,9 +15,11 @@ from filippov._core import PageModel
 from filippov.app.page import Page
 from filippov.app.reply import Reply, failure, read_reply
 from filippov.app.script import write_script
+from filippov.app.sentences import branch_sentence, cycle_sentence, special_phrase
 from filippov.cycles import Branch, Cycle, continuation, equilibrium, limit_cycle
 from filippov.cycles.branch import State
 from filippov.errors import FilippovError, InputError
+from filippov.options import check_options
 from filippov.scalars import real
 
 __all__ = ["Engine"]
@@ -25,6 +28,8 @@ Array = npt.NDArray[np.float64]
 
 _CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "basins", "sample")
 _MOST_POINTS = 300
+_SAMPLES = 401  # of a cycle, for its extent: to 3e-5 of the amplitude of a sine
+_LOG = logging.getLogger(__name__)
 
 
 class Engine:
@@ -80,6 +85,11 @@ class Engine:
                 return self._own[kind](given).to_bytes()
         except (FilippovError, ValueError) as error:
             return failure(str(error), "argument")
+        except (
+            Exception
+        ) as error:  # a request is answered, whatever happens; a page would wait for the answer
+            _LOG.exception("the request %r failed", kind)
+            return failure(f"The kernel failed at this: {type(error).__name__}: {error}", "failed")
 
     def _with_kinds(self, kind: str, data: bytes) -> bytes:
         if kind != "describe":
@@ -105,10 +115,12 @@ class Engine:
         )
 
     def _script(self, given: Mapping[str, Any]) -> Reply:
-        page = self.page._replace(
-            rtol=_number(given, "rtol", self.page.rtol), atol=_number(given, "atol", self.page.atol)
-        )
-        text = write_script(page, self._start(given), self._span(given), self._params(given))
+        rtol, atol = _number(given, "rtol", self.page.rtol), _number(given, "atol", self.page.atol)
+        start, (t0, t1) = self._start(given), self._span(given)
+        method = given.get("method") or self.page.method
+        checked = check_options({"rtol": rtol, "atol": atol, "method": method}, (t0, t1), len(start))
+        page = self.page._replace(rtol=rtol, atol=atol, method=checked.method)
+        text = write_script(page, start, (t0, t1), self._params(given))
         return Reply({"ok": True, "kind": "script", "text": text}, {})
 
     def _cycle(self, given: Mapping[str, Any]) -> Reply:
@@ -132,7 +144,7 @@ class Engine:
             "multipliers": _pairs(found.multipliers),
             "stable": found.is_stable,
             "forced": found.is_forced,
-            "text": repr(found),
+            "text": cycle_sentence(found),
         }
         return reply._replace(header=header)
 
@@ -146,7 +158,7 @@ class Engine:
         of = given.get("of", "cycle")
         start: State
         if of == "cycle":
-            start = self._found_cycle(given)
+            start = self._to_follow(given)
         elif of == "equilibrium":
             start = equilibrium(self.page.system, self._start(given), self._params(given))
         else:
@@ -159,6 +171,18 @@ class Engine:
         period = None if given.get("period") is None else _number(given, "period", 0.0)
         t0 = _number(given, "t0", self._span(given)[0])
         return limit_cycle(self.page.system, self._start(given), self._params(given), period=period, t0=t0)
+
+    def _to_follow(self, given: Mapping[str, Any]) -> Cycle:
+        """Return the cycle that a branch starts with.
+
+        At a late time the phase of a forcing turns fast with its frequency: a branch would have tiny steps.
+        """
+        found = self._found_cycle(given)
+        if not found.is_forced:
+            return found
+        period = None if given.get("period") is None else found.period
+        options: dict[str, Any] = {"period": period, "t0": 0.0, "transient": 0}
+        return limit_cycle(self.page.system, found.at(0.0), found.params, **options)
 
     def _start(self, given: Mapping[str, Any]) -> list[float]:
         if given.get("y0") is None:
@@ -185,12 +209,18 @@ def _branch_reply(branch: Branch, name: str) -> Reply:
             "index": found.point,
             "value": found.params[name],
             "code": found.code,
-            "text": repr(found),
+            "text": special_phrase(found),
             "y": _place(found.state).tolist(),
         }
         for found in branch.special
     ]
-    header = {"ok": True, "kind": "continuation", "parameter": name, "special": special, "text": repr(branch)}
+    header = {
+        "ok": True,
+        "kind": "continuation",
+        "parameter": name,
+        "special": special,
+        "text": branch_sentence(branch),
+    }
     arrays = {
         "value": np.array([point.params[name] for point in branch.points]),
         "y": np.array([_place(state) for state in states]),
@@ -211,7 +241,11 @@ def _place(state: State) -> Array:
 def _extent(state: State) -> tuple[Array, Array]:
     if not isinstance(state, Cycle):
         return state.y, state.y
-    y = state.solution.y
+    run = state.solution
+    assert run.sol is not None  # a run over one period keeps its steps
+    # Steps are long: their ends alone would miss the extremes. Both sides of a jump are ends of steps.
+    between = run.sol(np.linspace(run.t[0], run.t[-1], _SAMPLES))
+    y = np.concatenate([run.y, between], axis=1)
     return y.min(axis=1), y.max(axis=1)
 
 

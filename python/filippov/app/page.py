@@ -22,7 +22,7 @@ from filippov.scalars import real
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Page", "make_page"]
+__all__ = ["Page", "make_page", "problem_rows"]
 
 Array = npt.NDArray[np.float64]
 
@@ -244,6 +244,20 @@ def make_page(
     )
     page.prepared()
     return page
+
+
+def problem_rows(names: Sequence[str]) -> list[dict[str, str]]:
+    """Return the rows of the list of reference problems that a page offers: name, title, what happens.
+
+    Examples
+    --------
+    >>> from filippov.app.page import problem_rows
+    >>> problem_rows(["welander"])[0]["note"]
+    'to the oscillation between a mixed and an unmixed ocean'
+    """
+    return [
+        {"name": name, "title": name.replace("_", " "), "note": problems.get(name).note} for name in names
+    ]
 
 
 def _problem(shown: Any) -> Problem | None:

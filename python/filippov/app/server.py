@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from filippov import problems
 from filippov.app.engine import Engine
 from filippov.app.files import ENGINE, front, static_folder
-from filippov.app.page import Page, make_page
+from filippov.app.page import Page, make_page, problem_rows
 from filippov.errors import FilippovError, InputError
 
 __all__ = ["MOST_BYTES", "TOKEN_HEADER", "Server"]
@@ -207,8 +207,7 @@ class _Handler(BaseHTTPRequestHandler):
             model = self.owner.engine.model
             return _Answer(HTTPStatus.OK, model, _BYTES) if model else _Answer(HTTPStatus.NO_CONTENT)
         if path == "/models/index.json":
-            rows = [{"name": name, "title": name.replace("_", " ")} for name in problems.names()]
-            return _Answer(HTTPStatus.OK, json.dumps(rows).encode(), _JSON)
+            return _Answer(HTTPStatus.OK, json.dumps(problem_rows(problems.names())).encode(), _JSON)
         if path.startswith("/models/") and path.endswith(".flp"):
             model_of_problem = _model_of(path.removeprefix("/models/").removesuffix(".flp"))
             if model_of_problem is not None:

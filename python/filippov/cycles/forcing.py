@@ -134,7 +134,7 @@ class InferredPeriod:
             changed = [name for name in params if params[name] != known[name]]
             if all(self._exponent(motions, name, known, period).is_integer() for name in changed):
                 for name in changed:
-                    period *= (params[name] / known[name]) ** self.exponents[name]
+                    period *= _ratio(name, params[name], known[name], self.exponents[name])
             if not _repeats(motions, period):
                 period = _refined(motions, period)
             self._known = params, period
@@ -164,6 +164,15 @@ class InferredPeriod:
             is_whole = abs(found - round(found)) < 1e-8 and params[name] != 0.0
             self.exponents[name] = float(round(found)) if is_whole else 0.5
         return self.exponents[name]
+
+
+def _ratio(name: str, value: float, known: float, exponent: float) -> float:
+    """Return the factor by which a period changes with a parameter that it has as a power."""
+    if exponent == 0.0:
+        return 1.0
+    if value == 0.0 or known == 0.0:
+        raise ModelError(f"the forcing has no period at {name} = 0")
+    return float((value / known) ** exponent)
 
 
 def _slope_of_period(motions: Motions, name: str, period: float) -> float:

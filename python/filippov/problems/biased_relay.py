@@ -17,4 +17,8 @@ def rhs(t: float, x: Sequence[Any], bias: float = 0.3) -> list[Any]:
     return [bias - np.sign(x[0])]
 
 
-PROBLEMS = (Problem("biased_relay", rhs, (1.0,), (0.0, 10.0), (0.3,), "enters x = 0 at t = 1/0.7 and stays"),)
+PROBLEMS = (
+    Problem(
+        "biased_relay", rhs, (1.0,), (0.0, 10.0), (0.3,), "enters x = 0 at t = 1/0.7 and stays", states=("x",)
+    ),
+)

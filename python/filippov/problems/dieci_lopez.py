@@ -66,20 +66,62 @@ def example_6_4(t: float, x: Any, case: str = "i") -> Any:
     return a @ x + np.array(relay_gain(case)) * u
 
 
+_STATES = ("x1", "x2", "x3", "x4")
+
 PROBLEMS = (
-    Problem("dieci_lopez_4_4", example_4_4, (1.0, 0.4, 0.3), (0.0, 3.0), (0.0,), "x2 = 0 first, then x1 = 0"),
     Problem(
-        "dieci_lopez_4_4_mp", example_4_4, (-0.25, 0.75, 0.0), (0.0, 3.0), (0.0,), "x1 = 0 first, then x2 = 0"
-    ),
-    Problem("dieci_lopez_4_4_plus1", example_4_4, (-0.5, 1.25, -1.0), (0.0, 3.0), (1.0,), "a = 1"),
-    Problem(
-        "dieci_lopez_4_4_simultaneous", example_4_4, (-0.5, -0.5, 0.25), (0.0, 2.0), (0.0,), "both at t = 1/2"
-    ),
-    Problem(
-        "dieci_lopez_6_1", example_6_1, (-2.0, 1.5), (0.0, 25.0), (), "transient to the stick-slip cycle"
+        "dieci_lopez_4_4",
+        example_4_4,
+        (1.0, 0.4, 0.3),
+        (0.0, 3.0),
+        (0.0,),
+        "x2 = 0 first, then x1 = 0",
+        states=_STATES[:3],
     ),
     Problem(
-        "dieci_lopez_6_1_far", example_6_1, (3.0, 2.0), (0.0, 30.0), (), "transient to the stick-slip cycle"
+        "dieci_lopez_4_4_mp",
+        example_4_4,
+        (-0.25, 0.75, 0.0),
+        (0.0, 3.0),
+        (0.0,),
+        "x1 = 0 first, then x2 = 0",
+        states=_STATES[:3],
+    ),
+    Problem(
+        "dieci_lopez_4_4_plus1",
+        example_4_4,
+        (-0.5, 1.25, -1.0),
+        (0.0, 3.0),
+        (1.0,),
+        "a = 1",
+        states=_STATES[:3],
+    ),
+    Problem(
+        "dieci_lopez_4_4_simultaneous",
+        example_4_4,
+        (-0.5, -0.5, 0.25),
+        (0.0, 2.0),
+        (0.0,),
+        "both at t = 1/2",
+        states=_STATES[:3],
+    ),
+    Problem(
+        "dieci_lopez_6_1",
+        example_6_1,
+        (-2.0, 1.5),
+        (0.0, 25.0),
+        (),
+        "transient to the stick-slip cycle",
+        states=_STATES[:2],
+    ),
+    Problem(
+        "dieci_lopez_6_1_far",
+        example_6_1,
+        (3.0, 2.0),
+        (0.0, 30.0),
+        (),
+        "transient to the stick-slip cycle",
+        states=_STATES[:2],
     ),
     Problem(
         "dieci_lopez_6_1_cycle",
@@ -88,11 +130,34 @@ PROBLEMS = (
         (0.0, 9.230770458082978872880010083680645974847),
         (),
         "cycle",
+        states=_STATES[:2],
     ),
-    Problem("dieci_lopez_6_2", example_6_2, (0.5, 2.0, 0.75), (0.0, 4.0), (), "the quadric first"),
-    Problem("dieci_lopez_6_2_plane_first", example_6_2, (1.5, 1.5, -1.5), (0.0, 4.0), (), "the plane first"),
     Problem(
-        "dieci_lopez_6_4_i", example_6_4, (0.5, 0.0, 0.2, 0.1), (0.0, 60.0), ("i",), "sliding limit cycle"
+        "dieci_lopez_6_2",
+        example_6_2,
+        (0.5, 2.0, 0.75),
+        (0.0, 4.0),
+        (),
+        "the quadric first",
+        states=_STATES[:3],
+    ),
+    Problem(
+        "dieci_lopez_6_2_plane_first",
+        example_6_2,
+        (1.5, 1.5, -1.5),
+        (0.0, 4.0),
+        (),
+        "the plane first",
+        states=_STATES[:3],
+    ),
+    Problem(
+        "dieci_lopez_6_4_i",
+        example_6_4,
+        (0.5, 0.0, 0.2, 0.1),
+        (0.0, 60.0),
+        ("i",),
+        "sliding limit cycle",
+        states=_STATES,
     ),
     Problem(
         "dieci_lopez_6_4_i_cycle",
@@ -101,6 +166,15 @@ PROBLEMS = (
         (0.0, 9.622176123019984740772651026481454275356),
         ("i",),
         "one period of the limit cycle",
+        states=_STATES,
     ),
-    Problem("dieci_lopez_6_4_ii", example_6_4, (0.5, 0.0, 0.2, 0.1), (0.0, 13.0), ("ii",), "439 crossings"),
+    Problem(
+        "dieci_lopez_6_4_ii",
+        example_6_4,
+        (0.5, 0.0, 0.2, 0.1),
+        (0.0, 13.0),
+        ("ii",),
+        "439 crossings",
+        states=_STATES,
+    ),
 )

@@ -33,5 +33,6 @@ PROBLEMS = (
         (0.0, 30.0),
         (),
         "one crossing, then slides that all end at y1 = 1; power 3/2 at the surface",
+        states=("y1", "y2"),
     ),
 )

@@ -67,10 +67,28 @@ _CYCLES = (
     ),
 )
 
+_STATES = ("twist", "upper", "lower")
+
 PROBLEMS = (
     *(
-        Problem(f"drill_string_u{u}", rhs, start, (0.0, period), (float(u),), "one period of the limit cycle")
+        Problem(
+            f"drill_string_u{u}",
+            rhs,
+            start,
+            (0.0, period),
+            (float(u),),
+            "one period of the limit cycle",
+            states=_STATES,
+        )
         for u, start, period in _CYCLES
     ),
-    Problem("drill_string", rhs, (0.0, 1.0, 0.5), (0.0, 30.0), (3.0,), "transient to the stick-slip cycle"),
+    Problem(
+        "drill_string",
+        rhs,
+        (0.0, 1.0, 0.5),
+        (0.0, 30.0),
+        (3.0,),
+        "transient to the stick-slip cycle",
+        states=_STATES,
+    ),
 )

@@ -34,6 +34,8 @@ _ATTRACTORS = (
     ("III", 1 / 6, (-0.5374500018259062696386464058582347888331, 0.2544629167250997561338939892726179989648)),
 )
 
+_AUTONOMOUS = ("y", "v", "phase")
+
 PROBLEMS = (
     Problem(
         "dry_friction",
@@ -42,6 +44,7 @@ PROBLEMS = (
         (0.0, 60 * math.pi),
         (0.4, 1 / 3),
         "a transient over ten periods of the forcing",
+        states=("y", "v"),
     ),
     Problem(
         "dry_friction_autonomous",
@@ -50,6 +53,7 @@ PROBLEMS = (
         (0.0, 60 * math.pi),
         (0.4, 1 / 3),
         "the same with the phase as third state",
+        states=_AUTONOMOUS,
     ),
     *(
         Problem(
@@ -59,6 +63,7 @@ PROBLEMS = (
             (0.0, 2 * math.pi / omega),
             (0.4, omega),
             f"one period of attractor {label}",
+            states=_AUTONOMOUS,
         )
         for label, omega, start in _ATTRACTORS
     ),

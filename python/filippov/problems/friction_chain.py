@@ -48,5 +48,6 @@ PROBLEMS = (
         (0.0, 120.0),
         (0.1,),
         "five blocks stick, and slip in turn",
+        states=(*(f"{name}{i}" for name in "qv" for i in range(1, BLOCKS + 1)), "work", "heat"),
     ),
 )

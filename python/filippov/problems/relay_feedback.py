@@ -36,6 +36,7 @@ PROBLEMS = (
         (0.0, 4 * math.pi),
         (0.05, 25.0, 1.0),
         "28 sliding segments",
+        states=("x1", "x2", "x3"),
     ),
     Problem(
         "relay_feedback_cycle",
@@ -44,6 +45,7 @@ PROBLEMS = (
         (0.0, 5.961836942613702773841781757522581805552),
         (0.05, 25.0, 1.0),
         "one period of the limit cycle, from the departure after the long sliding segment",
+        states=("x1", "x2", "x3"),
     ),
     Problem(
         "relay_feedback_slow",
@@ -52,6 +54,7 @@ PROBLEMS = (
         (0.0, 40.0),
         (-0.07, 10.0, 1.0),
         "settles slowly on a periodic orbit",
+        states=("x1", "x2", "x3"),
     ),
     Problem(
         "relay_feedback_fast",
@@ -60,5 +63,6 @@ PROBLEMS = (
         (0.0, 10.0),
         (-0.07, 25.0, 10.0),
         "settles on a short periodic orbit, two departures per period",
+        states=("x1", "x2", "x3"),
     ),
 )

@@ -71,5 +71,6 @@ PROBLEMS = (
         (0.0, 40.0),
         (),
         "friction contacts that close loops",
+        states=(*(f"{name}{i}" for name in "qv" for i in range(1, BLOCKS + 1)), "work", "heat"),
     ),
 )

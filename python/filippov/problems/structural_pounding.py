@@ -40,5 +40,6 @@ PROBLEMS = (
         (0.0, 3.0),
         (2.47e6,),
         "six contacts, each with a change of sign of the speed; the force is defined in contact only",
+        states=("y", "v"),
     ),
 )

@@ -30,5 +30,6 @@ PROBLEMS = (
         (0.0, 12.0),
         (),
         "18 switches; mass 1 sticks at t = 8.8259, both rest from t = 10.8197 (codimension 2)",
+        states=("y1", "y2", "v1", "v2"),
     ),
 )
