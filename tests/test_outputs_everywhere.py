@@ -332,9 +332,8 @@ def test_outputs_are_drawn(system: fl.System) -> None:
     drawn = np.concatenate([line.get_ydata() for line in axes.lines])
     # Between two pieces a line has a gap.
     assert np.nanmax(drawn) == pytest.approx(sol.y[0].max(), abs=0.01)
-    assert any(
-        np.nanmax(line.get_ydata()) == 1.0 for line in axes.lines
-    )  # the friction of a block that slips
+    friction = [np.nanmax(line.get_ydata()) for line in axes.lines]
+    assert 1.0 in friction  # that of a block that slips
     axes = fl.plot.time_series(sol, states="energy")
     assert axes.get_ylabel() == "energy"
     axes = fl.plot.phase(sol, "x", "friction")
@@ -345,7 +344,8 @@ def test_outputs_are_drawn(system: fl.System) -> None:
     geared = fl.System(lambda t, x, gear: [gear], n=1, discrete={"gear": 1}, resets=up).solve((0, 3), [0.0])
     for run in (geared, pickle.loads(pickle.dumps(geared))):
         (line,) = run.plot(states="gear").lines[-1:]
-        assert set(line.get_ydata()) <= {1.0, 2.0, 3.0}
+        gears = line.get_ydata()
+        assert set(gears[np.isfinite(gears)]) == {1.0, 2.0, 3.0}
     with pytest.raises(ValueError, match="no state or output 'w'; the names are x, v, friction, energy"):
         sol.plot(states="w")
     pyplot.close("all")
