@@ -135,7 +135,7 @@ docs-text: $(DOCS_STAMP) ## the documentation without running its code or compil
 
 docs: $(BUILD_STAMP) $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --release --no-deps $(RUST_TESTED)
 
 check: lint types test ## what must hold before a change is complete; changes nothing
 
