@@ -285,7 +285,7 @@ impl PlaceSpec {
             "surface" => {
                 let name: Option<String> = item(given, "kind")?.extract()?;
                 let kind = match name {
-                    Some(name) => Some(kind_named(&name).ok_or_else(|| refused("section: kind"))?),
+                    Some(name) => Some(Kind::named(&name).ok_or_else(|| refused("section: kind"))?),
                     None => None,
                 };
                 Ok(PlaceSpec::Surface(
@@ -312,19 +312,6 @@ fn item<'py>(given: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAn
     given
         .get_item(name)?
         .ok_or_else(|| PyKeyError::new_err(name.to_owned()))
-}
-
-fn kind_named(name: &str) -> Option<Kind> {
-    let kinds = [
-        Kind::Crossing,
-        Kind::EnterSliding,
-        Kind::ExitSliding,
-        Kind::SwitchSliding,
-        Kind::Grazing,
-        Kind::Accumulation,
-        Kind::Reset,
-    ];
-    kinds.into_iter().find(|kind| kind.name() == name)
 }
 
 /// The kinds of warnings, in the order of their bits in the column `warnings` of a sweep.

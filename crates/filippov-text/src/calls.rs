@@ -77,7 +77,7 @@ impl Reader<'_> {
 
     /// The full name of the function that is called.
     fn function_name(&mut self, call: &ExprCall) -> Result<String, Refused> {
-        if let Some(name) = self.library_name(&call.func) {
+        if let Some(name) = self.name_in_numpy_or_math(&call.func) {
             return Ok(name);
         }
         if let Expr::Name(name) = &*call.func {

@@ -51,8 +51,9 @@ impl Reader<'_> {
                 };
                 for operand in others {
                     let value = self.value(operand)?;
-                    let goes_on = self.truth(operand, &value)? == (operation.op == BoolOp::And);
-                    if !goes_on {
+                    let needs_the_next =
+                        self.truth(operand, &value)? == (operation.op == BoolOp::And);
+                    if !needs_the_next {
                         return Ok(value);
                     }
                 }
@@ -99,7 +100,7 @@ impl Reader<'_> {
                 return Ok(value.clone());
             }
         }
-        match self.library_name(expression).as_deref() {
+        match self.name_in_numpy_or_math(expression).as_deref() {
             Some("numpy.pi" | "math.pi") => Ok(Value::float(std::f64::consts::PI)),
             Some("numpy.e" | "math.e") => Ok(Value::float(std::f64::consts::E)),
             Some(name) => refuse(expression, format!("{name} is not read here")),
@@ -113,7 +114,7 @@ impl Reader<'_> {
     }
 
     /// What a dotted name means, if a library has it: `np.sin` is `numpy.sin`.
-    pub fn library_name(&self, expression: &Expr) -> Option<String> {
+    pub fn name_in_numpy_or_math(&self, expression: &Expr) -> Option<String> {
         match expression {
             Expr::Name(name) => {
                 let name = name.id.as_str();
@@ -122,7 +123,7 @@ impl Reader<'_> {
                 meaning.cloned()
             }
             Expr::Attribute(part) => {
-                let of = self.library_name(&part.value)?;
+                let of = self.name_in_numpy_or_math(&part.value)?;
                 Some(format!("{of}.{}", part.attr))
             }
             _ => None,

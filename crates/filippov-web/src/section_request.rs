@@ -144,17 +144,6 @@ impl SectionRequest {
 }
 
 fn kind_of(section: &Request, name: &str) -> Result<Kind, Refusal> {
-    let kinds = [
-        Kind::Crossing,
-        Kind::EnterSliding,
-        Kind::ExitSliding,
-        Kind::SwitchSliding,
-        Kind::Grazing,
-        Kind::Accumulation,
-        Kind::Reset,
-        Kind::Clock,
-    ];
-    let known = kinds.into_iter().find(|kind| kind.name() == name);
-    let names = kinds.map(Kind::name).join(", ");
-    known.ok_or_else(|| section.wrong("kind", &format!("{name:?} is none of {names}")))
+    let names = Kind::ALL.map(Kind::name).join(", ");
+    Kind::named(name).ok_or_else(|| section.wrong("kind", &format!("{name:?} is none of {names}")))
 }

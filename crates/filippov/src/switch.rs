@@ -51,6 +51,23 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 8] = [
+        Kind::Crossing,
+        Kind::EnterSliding,
+        Kind::ExitSliding,
+        Kind::SwitchSliding,
+        Kind::Grazing,
+        Kind::Accumulation,
+        Kind::Reset,
+        Kind::Clock,
+    ];
+
+    /// The kind of this name.
+    pub fn named(name: &str) -> Option<Kind> {
+        Kind::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// The name used in tables.
     pub fn name(self) -> &'static str {
         match self {

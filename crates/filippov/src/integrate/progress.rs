@@ -44,7 +44,7 @@ impl Progress {
         self.n_since
     }
 
-    /// Since when time has not gone on, at `t`.
+    /// The time of the first of the switches between which time did not advance, at `t`.
     pub fn stands_since(&self, t: f64) -> f64 {
         let is_near = |since: &f64| t - since <= NO_PROGRESS * t.abs();
         self.since.filter(is_near).unwrap_or(t)

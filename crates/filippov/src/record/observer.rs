@@ -85,8 +85,8 @@ pub struct InstantRecord<'i> {
     pub map: Option<&'i [f64]>,
     /// The actions that are done, in their order.
     pub acts: &'i [Act],
-    /// Is the next motion followed in the place of one that is the same only up to the tolerance? Then a small change of the state is not
-    /// known any more.
+    /// Does the next motion stand for another one, which equals it up to the tolerance? Then nobody knows what a small change of the
+    /// state becomes.
     pub replaces: bool,
 }
 
