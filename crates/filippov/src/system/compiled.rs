@@ -31,7 +31,7 @@ pub(super) struct Model {
     pub n_states: usize,
     pub names: Names,
     backend: Backend,
-    pub field_program: FieldProgram,
+    pub field_program: TieredProgram,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
     single_rates: Vec<OnceLock<TieredProgram>>,
@@ -132,29 +132,8 @@ type JacobianCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<MotionJacobian>>
 /// Sets of surfaces whose derivatives are kept: a run over more of them finds some anew now and then.
 const MOST_JACOBIANS: usize = 64;
 
-/// Graphs of more nodes take so long to compile that the run begins before.
-const LARGEST_AWAITED: usize = 10_000;
-
-/// The field: every run needs it, so that it is compiled at once, unless that takes long.
-pub(super) enum FieldProgram {
-    Compiled(Program),
-    Tiered(Box<TieredProgram>),
-}
-
-impl FieldProgram {
-    fn new(graph: &Graph, field: &[NodeId], backend: Backend) -> Result<Self, ExprError> {
-        if graph.len() <= LARGEST_AWAITED {
-            return Program::compile(graph, field, backend).map(FieldProgram::Compiled);
-        }
-        // Tells of what cannot be compiled.
-        Program::compile(graph, field, Backend::Interpreter)?;
-        let tiered = TieredProgram::new(graph.clone(), field.to_vec(), backend);
-        Ok(FieldProgram::Tiered(Box::new(match backend {
-            Backend::Interpreter => tiered,
-            Backend::Auto | Backend::Native => tiered.soon(),
-        })))
-    }
-}
+/// Fields of larger graphs take so long to interpret, and to compile, that their native code is begun with at once.
+const LARGEST_INTERPRETED: usize = 10_000;
 
 /// Output 0 is the derivative, the others its terms.
 struct LieProgram {
@@ -176,7 +155,10 @@ impl Model {
         let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
             .map(|j| graph.surface(j as u32))
             .collect();
-        let field_program = FieldProgram::new(&graph, &field, backend)?;
+        let mut field_program = TieredProgram::checked(graph.clone(), field.clone(), backend)?;
+        if graph.len() > LARGEST_INTERPRETED {
+            field_program = field_program.soon();
+        }
         let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
         Ok(Model {
             n_states: field.len(),
@@ -219,20 +201,9 @@ impl Model {
         })
     }
 
-    /// The field.
-    pub fn field_program(&self) -> &Program {
-        match &self.field_program {
-            FieldProgram::Compiled(program) => program,
-            FieldProgram::Tiered(tiered) => tiered.program(),
-        }
-    }
-
-    /// Is the field native code, or about to be?
+    /// Is the field native code, or will it be after some calls?
     pub fn is_native(&self) -> bool {
-        match &self.field_program {
-            FieldProgram::Compiled(program) => program.is_native(),
-            FieldProgram::Tiered(_) => self.backend != Backend::Interpreter && has_native_code(),
-        }
+        self.backend != Backend::Interpreter && has_native_code()
     }
 
     /// Does one of these surfaces have a higher relative degree than 1?

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use filippov_expr::{has_native_code, Backend, Graph, NodeId, Program};
+use filippov_expr::{has_native_code, Backend, ExprError, Graph, NodeId, Program};
 
 use super::compiler::{compile_later, Late};
 
@@ -29,7 +29,15 @@ pub(super) type TieredProgram = Tiered<Program>;
 impl<P: Send + 'static> Tiered<P> {
     /// A program that `compile` makes.
     pub fn from(compile: impl Fn(Backend) -> P + Send + Sync + 'static, backend: Backend) -> Self {
-        let interpreted = compile(Backend::Interpreter);
+        Tiered::beside(compile(Backend::Interpreter), compile, backend)
+    }
+
+    /// A program that is there already as the interpreter runs it.
+    fn beside(
+        interpreted: P,
+        compile: impl Fn(Backend) -> P + Send + Sync + 'static,
+        backend: Backend,
+    ) -> Self {
         let is_compiled = backend != Backend::Interpreter && has_native_code();
         Tiered {
             interpreted,
@@ -67,6 +75,12 @@ impl<P: Send + 'static> Tiered<P> {
         self.adopt()
     }
 
+    /// The native code, if it is there.
+    #[inline(always)]
+    pub fn native(&self) -> Option<&P> {
+        self.native.get()
+    }
+
     /// Has its native code compiled from now on.
     #[must_use]
     pub fn soon(self) -> Self {
@@ -100,6 +114,23 @@ impl TieredProgram {
     /// Takes the graph that the outputs were just made in.
     pub fn new(graph: Graph, outputs: Vec<NodeId>, backend: Backend) -> Self {
         Tiered::from(move |backend| compile(&graph, &outputs, backend), backend)
+    }
+
+    /// The same for outputs that may not be of the graph.
+    ///
+    /// # Errors
+    /// If they cannot be compiled; for [`Backend::Native`], if there is no native code.
+    pub fn checked(
+        graph: Graph,
+        outputs: Vec<NodeId>,
+        backend: Backend,
+    ) -> Result<Self, ExprError> {
+        if backend == Backend::Native && !has_native_code() {
+            Program::compile(&graph, &outputs, backend)?;
+        }
+        let interpreted = Program::compile(&graph, &outputs, Backend::Interpreter)?;
+        let make = move |backend| compile(&graph, &outputs, backend);
+        Ok(Tiered::beside(interpreted, make, backend))
     }
 }
 

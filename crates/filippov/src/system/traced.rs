@@ -11,7 +11,7 @@ use filippov_expr::{
 };
 use smallvec::SmallVec;
 
-use super::compiled::{FieldProgram, Follower, Model};
+use super::compiled::{Follower, Model};
 use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
@@ -184,7 +184,7 @@ impl TracedSystem {
     #[cold]
     #[inline(never)]
     fn field_apart(&self, place: &Place<'_>, dx: &mut [f64]) {
-        self.eval(self.model.field_program(), place, &[], dx);
+        self.eval(self.model.field_program.program(), place, &[], dx);
     }
 }
 
@@ -269,8 +269,8 @@ impl PiecewiseSystem for TracedSystem {
     fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
         let &Place { t, x, signs, q } = place;
         let p = &self.parameters;
-        match &self.model.field_program {
-            FieldProgram::Compiled(program)
+        match self.model.field_program.native() {
+            Some(program)
                 if q.is_empty() && program.eval_native(t, x, signs, p, &[], dx) => {}
             _ => self.field_apart(place, dx),
         }
