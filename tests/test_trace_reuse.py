@@ -465,6 +465,62 @@ def test_lambda_made_again_in_a_loop() -> None:
     assert [final(closure(k)) for k in (1.0, 2.0, 1.0, 3.0)] == kept
 
 
+# What a function may do with a number that it reads; traced values see only some of it.
+USES = [
+    "-k * x[0]",
+    "x[0] / k - k**2 * x[1]",
+    "-x[0] + k * np.sign(x[1] - k)",
+    "np.where(x[0] > k, -k, x[1])",
+    "-(abs(x[0] - 1.5) ** k)",
+    "np.clip(x[0], -abs(k), abs(k))",
+    "x[0] if k > 1.0 else -x[0]",
+    "x[0] if k == 2.0 else -x[1]",
+    "sum(x[0] for _ in range(int(k + 2)))",
+    "[x[0], x[1], 2.0 * x[0]][int(k) % 3]",
+    "float(f'{k:.0f}') * x[0]",
+    "{1.0: x[0]}.get(k, x[1])",
+    "x[0] if k in (1.0, 2.0) else x[1]",
+    "math.sin(k) * x[0]",
+    "np.sin(k) * x[0]",
+    "sum([0.1, k, k, 1e-17]) * x[0]",
+    "np.array([k, 0.1, 0.3]).sum() * x[0]",
+    "(np.array([[k, 1.0], [0.0, k]]) @ x)[0]",
+    "round(k) * x[0]",
+    "bool(k - 1.0) * x[0]",
+]
+PLACES = {
+    "a variable of an outer function": "def make(k):\n    return lambda t, x: [x[1], {use}]",
+    "a default": "def make(k):\n    return lambda t, x, k=k: [x[1], {use}]",
+    "a global": "def fun(t, x):\n    return [x[1], {use}]\ndef make(value):\n    global k\n    k = value\n    return fun",
+    "an argument of a helper": (
+        "def helper(x, k):\n    return {use}\ndef make(k):\n    return lambda t, x: [x[1], helper(x, k)]"
+    ),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("use", USES)
+def test_a_number_that_changes_from_call_to_call(use: str, place: str) -> None:
+    names: dict[str, Any] = {"np": np, "math": math}
+    exec(PLACES[place].format(use=use), names)
+    make = names["make"]
+
+    def answer(k: Any) -> Any:
+        try:
+            sol = fl.solve_ivp(make(k), SPAN, [1.3, 1.7])
+        except (ValueError, TypeError) as error:
+            return type(error), str(error)
+        return sol.t.tobytes(), sol.y.tobytes(), sol.surfaces, sol.message
+
+    values = (0.5, 0.75, 1.0, 2.0, 2.5, -1.0, 2, np.float64(0.75), 0.0, 0.5)
+    in_a_loop = [answer(k) for k in values]
+    alone = []
+    for k in values:
+        prepare._KEPT.clear()
+        alone.append(answer(k))
+    assert in_a_loop == alone
+
+
 def test_functions_of_numpy_and_python_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     def fun(t: Any, x: Any) -> Any:
         return [np.sin(x[1]), -abs(x[0])]

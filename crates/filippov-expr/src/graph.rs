@@ -153,6 +153,13 @@ impl Graph {
         Arc::make_mut(&mut self.surfaces)
     }
 
+    /// Makes room for so many more nodes.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        self.nodes.reserve(more);
+        self.facts.reserve(more);
+        self.ids.reserve(more);
+    }
+
     pub(crate) fn facts(&self, id: NodeId) -> Facts {
         self.facts[id.index()]
     }
@@ -210,9 +217,7 @@ impl Graph {
 
     /// All nodes that the roots are made of, in increasing order.
     pub fn all_below(&self, roots: &[NodeId]) -> Vec<NodeId> {
-        self.reachable_by(roots.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        })
+        self.reachable_by(roots.iter().copied(), |id| self.node(id).operands())
     }
 
     /// The same, as far as `operands` says which operands of a node are followed.

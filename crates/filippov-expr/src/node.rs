@@ -66,27 +66,34 @@ impl Node {
         }
     }
 
-    /// A tag and two or three numbers that identify the node.
-    fn key(&self) -> (u8, u64, u32) {
+    /// Two numbers that identify the node: a tag with one that has up to 32 bits, and one that has more.
+    #[inline]
+    fn key(&self) -> (u64, u64) {
+        let tagged = |tag: u8, small: u32| u64::from(tag) << 32 | u64::from(small);
+        let leaf = |tag: u8, index: u32| (tagged(tag, 0), u64::from(index));
         match *self {
-            Node::Constant(value) => (0, value.to_bits(), 0),
-            Node::Time => (1, 0, 0),
-            Node::State(i) => (2, u64::from(i), 0),
-            Node::Parameter(i) => (3, u64::from(i), 0),
-            Node::Sign(j) => (4, u64::from(j), 0),
-            Node::Input(i) => (5, u64::from(i), 0),
-            Node::Unary(op, a) => (6 + op as u8, u64::from(a.0), 0),
-            Node::Binary(op, a, b) => (64 + op as u8, u64::from(a.0), b.0),
+            Node::Constant(value) => (tagged(0, 0), value.to_bits()),
+            Node::Time => leaf(1, 0),
+            Node::State(i) => leaf(2, i),
+            Node::Parameter(i) => leaf(3, i),
+            Node::Sign(j) => leaf(4, j),
+            Node::Input(i) => leaf(5, i),
+            Node::Unary(op, a) => leaf(6 + op as u8, a.0),
+            Node::Binary(op, a, b) => (tagged(64 + op as u8, b.0), u64::from(a.0)),
             Node::Select {
                 surface,
                 plus,
                 minus,
-            } => (128, u64::from(plus.0) << 32 | u64::from(minus.0), surface),
+            } => (
+                tagged(128, surface),
+                u64::from(plus.0) << 32 | u64::from(minus.0),
+            ),
         }
     }
 }
 
 impl PartialEq for Node {
+    #[inline]
     fn eq(&self, other: &Self) -> bool {
         self.key() == other.key()
     }
@@ -95,8 +102,11 @@ impl PartialEq for Node {
 impl Eq for Node {}
 
 impl Hash for Node {
+    #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        self.key().hash(state);
+        let (tagged, rest) = self.key();
+        state.write_u64(tagged);
+        state.write_u64(rest);
     }
 }
 

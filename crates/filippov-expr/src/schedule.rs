@@ -9,6 +9,9 @@ use crate::node::{Node, NodeId};
 /// The largest index of a variable: its byte offset has to fit the displacement of an instruction.
 pub(crate) const LARGEST_INDEX: u32 = (i32::MAX as u32) / 8 - 1;
 
+/// Room is made for so many nodes at once.
+const SOME_NODES: usize = 1024;
+
 /// How long the argument slices of a program have to be at least.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Lengths {
@@ -44,7 +47,13 @@ impl Schedule {
     /// a variable beyond 2^28.
     pub fn new(graph: &Graph, outputs: &[NodeId]) -> Result<Self, ExprError> {
         let mut schedule = Schedule::default();
+        // Most programs read most of their graph; of a large graph they may read little.
         let mut position_of: FxHashMap<NodeId, usize> = FxHashMap::default();
+        let some = graph.len().min(SOME_NODES);
+        position_of.reserve(some);
+        schedule.last_use.reserve(some);
+        schedule.order.reserve(some);
+        let mut pending = Vec::new();
         for (output, &root) in outputs.iter().enumerate() {
             if !graph.contains(root) {
                 return Err(ExprError::UnknownNode {
@@ -53,7 +62,7 @@ impl Schedule {
                 });
             }
             // A node is pushed once to visit its operands and stays below them to be computed after.
-            let mut pending = vec![(root, false)];
+            pending.push((root, false));
             while let Some((id, operands_done)) = pending.pop() {
                 if position_of.contains_key(&id) {
                     continue;
@@ -69,8 +78,12 @@ impl Schedule {
                     schedule.lengths.include(node)?;
                 } else {
                     pending.push((id, true));
-                    let operands: Vec<_> = node.operands().collect();
-                    pending.extend(operands.into_iter().rev().map(|operand| (operand, false)));
+                    let (first, second) = {
+                        let mut operands = node.operands();
+                        (operands.next(), operands.next())
+                    };
+                    let operands = second.into_iter().chain(first);
+                    pending.extend(operands.map(|operand| (operand, false)));
                 }
             }
             schedule.stores.push((position_of[&root], output as u32));

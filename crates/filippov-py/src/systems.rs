@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use filippov::derivative::Extension;
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
-    Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting, SignStructure,
+    field_off_surfaces, Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting,
+    SignStructure,
 };
 use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names};
@@ -77,7 +78,10 @@ pub fn all_signs(
     seen: &[f64],
 ) -> PyResult<Vec<f64>> {
     match system.cast::<TracedSystem>() {
-        Ok(traced) => traced.get().all_signs((core, q), t, x, seen),
+        Ok(traced) => traced
+            .get()
+            .all_signs((core, q), t, x, seen)
+            .map_err(raised),
         Err(_) => Ok(seen.to_vec()),
     }
 }
@@ -256,7 +260,7 @@ impl TracedSystem {
         t: f64,
         x: &[f64],
         seen: &[f64],
-    ) -> PyResult<Vec<f64>> {
+    ) -> Result<Vec<f64>, FieldError> {
         let (n, n_of_laws) = (core.n_surfaces(), self.rules.n_hidden);
         let mut signs = seen.to_vec();
         if signs.len() != self.n_visible || x.len() != core.n_states() {
@@ -266,7 +270,7 @@ impl TracedSystem {
         if self.n_visible < n - n_of_laws {
             let mut h = vec![0.0; n];
             let place = Setting::new(&signs, q).at(t, x);
-            core.surfaces(&place, &mut h).map_err(raised)?;
+            core.surfaces(&place, &mut h)?;
             for j in self.n_visible..n - n_of_laws {
                 signs[j] = if h[j] < 0.0 { -1.0 } else { 1.0 };
             }
@@ -283,7 +287,8 @@ impl TracedSystem {
         x: &Array<'py>,
         seen: &Array<'py>,
     ) -> PyResult<Array<'py>> {
-        let all = self.all_signs(of, t, x.as_slice()?, seen.as_slice()?)?;
+        let all = self.all_signs(of, t, x.as_slice()?, seen.as_slice()?);
+        let all = all.map_err(raised)?;
         Ok(PyArray1::from_vec(py, all).readonly())
     }
 }
@@ -399,6 +404,25 @@ impl TracedSystem {
         let all = surface_values_of(py, (&system, &q), t, &x, &signs)?;
         let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
         Ok(PyArray1::from_vec(py, visible))
+    }
+
+    /// The signs and the field at a point on no surface: see `field_off_surfaces` of the core.
+    fn off_surfaces<'py>(
+        &self,
+        py: Python<'py>,
+        t: f64,
+        x: Array<'py>,
+        p: Array<'py>,
+    ) -> PyResult<Option<(Output<'py>, Output<'py>)>> {
+        let x = x.as_slice()?;
+        if x.len() != self.system.n_states() {
+            return Err(PyValueError::new_err("x: one entry per state is needed"));
+        }
+        let (system, q) = self.at(p.as_slice()?, t, x)?;
+        let complete = |seen: &[f64]| self.all_signs((&system, &q), t, x, seen);
+        let found = field_off_surfaces(&system, self.n_visible(), complete, &q, (t, x));
+        let as_arrays = |(signs, dx)| (PyArray1::from_vec(py, signs), PyArray1::from_vec(py, dx));
+        Ok(found.map_err(raised)?.map(as_arrays))
     }
 
     #[allow(clippy::too_many_arguments)]

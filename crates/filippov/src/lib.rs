@@ -107,9 +107,9 @@ pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
-    classify, contradicts, hidden_dynamics, intersection_field, leg, message_of, not_finite,
-    state_text, Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, Leg,
-    LegError, NotFinitePlace, Over, PointKind,
+    classify, contradicts, field_off_surfaces, hidden_dynamics, intersection_field, leg,
+    message_of, not_finite, state_text, Classification, HiddenDynamics, HiddenRoot, Inspection,
+    IntersectionValue, Leg, LegError, NotFinitePlace, Over, PointKind,
 };
 pub use integrate::{Integrator, Problem, Reached};
 pub use mode::{Mode, Signs};

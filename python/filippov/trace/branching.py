@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from filippov._core import Regions, TracedSystem
 from filippov.errors import TraceError
 from filippov.trace.array import TracedArray, apply_ufunc
 from filippov.trace.array_functions import apply_function
@@ -27,7 +28,7 @@ from filippov.trace.scalar import Scalar
 from filippov.trace.still import parts_that_stand_still
 
 if TYPE_CHECKING:
-    from filippov._core import Builder, Regions
+    from filippov._core import Builder
     from filippov.trace.stand_ins import StandIns
 
 __all__ = ["MAX_DECISIONS", "Guard", "Question", "Tracer"]
@@ -419,8 +420,6 @@ class Tracer:
 
     def regions(self) -> Regions:
         """Return the regions of the expressions so far."""
-        from filippov._core import Regions
-
         return Regions(self.builder, self.values.tolist(), self.laws.discrete())
 
     def jumps(self, node: int) -> bool:
@@ -457,6 +456,8 @@ class Tracer:
         ``"floor"``, in both modes: a step that starts at the end of a root may look beyond it, however short
         it is.
         """
+        if not self._roots:
+            return field
         builder = self.builder
         images: list[tuple[int, int]] = []
         for root in builder.occurring(list(self._roots), field):
@@ -481,7 +482,8 @@ class Tracer:
 
     def has_roots(self, field: list[int]) -> bool:
         """Whether a field contains a root that may end."""
-        return bool(self.builder.occurring([root for root, (_, of) in self._roots.items() if of], field))
+        roots = [root for root, (_, of) in self._roots.items() if of]
+        return bool(roots) and bool(self.builder.occurring(roots, field))
 
     def as_surface(self, node: int) -> int:
         """Return an expression as a switching function: with its roots continued, also inside of others."""
@@ -521,8 +523,6 @@ class Tracer:
         constant = self.builder.as_constant(node)
         if constant is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
             return constant
-        from filippov._core import TracedSystem
-
         system = TracedSystem(self.builder, [node] * self.n_states, self.n_states, self.names(), self.states)
         signs = np.ones(self.builder.n_surfaces())
         return float(system.field(self.t0, self.y0, signs, self.values)[0])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from filippov._core import Builder, TracedEvent, TracedSystem
 from filippov.errors import ModelError, TraceError
 from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Question, Tracer
@@ -23,7 +24,6 @@ from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify, verify_event
 
 if TYPE_CHECKING:
-    from filippov._core import Builder, TracedEvent, TracedSystem
     from filippov.trace.explain import UserLine
     from filippov.trace.laws import Laws
     from filippov.trace.stand_ins import StandIns
@@ -175,8 +175,6 @@ def trace(
     >>> result.system.surfaces()
     ['x[1]']
     """
-    from filippov._core import Builder
-
     start = np.zeros(n) if y0 is None else np.array(y0, dtype=float)
 
     def record(tracer: Tracer) -> _Record:
@@ -298,8 +296,6 @@ def trace_output(
 
     It is returned in a form that can be written as bytes: the first component of the field of a system.
     """
-    from filippov._core import TracedSystem
-
     found = _beside(traced, g, args, t0, y0, parameters)
     if isinstance(found, str):
         return found
@@ -327,8 +323,6 @@ def _beside(
     An event reads the discrete states that the run follows. Other functions are evaluated at points, where
     those that the run does not follow are found anew.
     """
-    from filippov._core import TracedEvent
-
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
 
@@ -420,8 +414,6 @@ class _Again:
 
 def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> TracedSystem:
     """Compile a field of the trace, with its laws."""
-    from filippov._core import TracedSystem
-
     laws = tracer.laws
     return TracedSystem(
         tracer.builder,
@@ -545,7 +537,8 @@ def _nodes(tracer: Tracer, result: Any, role: str, n: int | None) -> list[int]:
                 "in place of `a > b` return the difference `a - b`"
             )
         return [_node(tracer, result, role)]
-    if isinstance(result, (Scalar, Condition)) or np.isscalar(result):
+    is_sequence = isinstance(result, (list, tuple)) or (isinstance(result, np.ndarray) and result.ndim == 1)
+    if not is_sequence and (isinstance(result, (Scalar, Condition)) or np.isscalar(result)):
         if n == 1:
             return [_node(tracer, result, role)]
         raise ModelError(f"{role} returned one number for a state of {n}")
@@ -556,7 +549,7 @@ def _nodes(tracer: Tracer, result: Any, role: str, n: int | None) -> list[int]:
             f"{role} returned an array of shape {result.shape} for a state of {n}: return shape ({n},), "
             "for example with .ravel()"
         )
-    if isinstance(result, (Mapping, Set, str, bytes, Iterator)):
+    if not is_sequence and isinstance(result, (Mapping, Set, str, bytes, Iterator)):
         raise ModelError(
             f"{role} returned a {type(result).__name__}: return a list or an array of {n} numbers"
         )

@@ -7,7 +7,8 @@ there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from filippov._core import TracedEvent, TracedSystem
     from filippov.trace.branching import Tracer
 
-__all__ = ["N_POINTS", "consistent_signs", "verify", "verify_event"]
+__all__ = ["N_POINTS", "verify", "verify_event"]
 
 # Points compared, the initial point included.
 N_POINTS = 5
@@ -33,6 +34,7 @@ _TOLERANCE = 1e-9
 _BEHIND = 1e-6
 
 Vector = NDArray[np.float64]
+_Point = tuple[float, Vector]
 
 
 def verify(
@@ -72,19 +74,14 @@ def verify(
         If they differ by more than 1e-9 of the size of the field.
     """
     with np.errstate(all="ignore"):
-        for idx in range(N_POINTS):
-            t, x = _point(t0, y0, idx)
-            if system.n_laws:
-                # Off the ticks, where rounding decides.
-                t += 1e-3 * (1.0 + abs(t)) * np.sqrt(0.1 + idx)
-            differs = _difference(system, fun, t, x, values)
-            if differs is None:
-                continue
-            component, own, traced = differs
+        points = _points(t0, y0)
+        if system.n_laws:
+            # Off the ticks, where rounding decides.
+            points = [(t + 1e-3 * (1 + abs(t)) * math.sqrt(0.1 + k), x) for k, (t, x) in enumerate(points)]
+        for t, x, own, traced in _differing(system, fun, points, values):
             dt = _BEHIND * (1.0 + abs(t))
-            behind = (t + dt, x + dt * traced)
-            if role != "fun" or _difference(system, fun, *behind, values) is not None:
-                raise _disagreement(fun, role, t, x, component, own, traced)
+            if role != "fun" or _differing(system, fun, [(t + dt, x + dt * traced)], values):
+                raise _disagreement(fun, role, t, x, int(np.abs(own - traced).argmax()), own, traced)
 
 
 def verify_event(event: TracedEvent, g: Callable[[float, Vector], Any], tracer: Tracer) -> None:
@@ -96,8 +93,7 @@ def verify_event(event: TracedEvent, g: Callable[[float, Vector], Any], tracer: 
         If they differ by more than 1e-9 of their size.
     """
     with np.errstate(all="ignore"):
-        for idx in range(N_POINTS):
-            t, x = _point(tracer.t0, tracer.y0, idx)
+        for t, x in _points(tracer.t0, tracer.y0):
             traced = event.value(t, x.tolist(), tracer.values.tolist())
             own = _evaluate(g, t, x)
             if traced is None or own is None or own.size != 1 or not np.isfinite(traced + own[0]):
@@ -106,75 +102,49 @@ def verify_event(event: TracedEvent, g: Callable[[float, Vector], Any], tracer: 
                 raise _disagreement(g, "event", t, x, 0, own, np.array([traced]))
 
 
-def _difference(
-    system: TracedSystem, fun: Callable[[float, Vector], Any], t: float, x: Vector, values: Vector
-) -> tuple[int, Vector, Vector] | None:
-    """Return the component that differs most at a point, and both results; None where none is known to."""
-    signs = consistent_signs(system, t, x, values)
-    if signs is None:
-        return None
-    traced = system.field(t, x, signs, values)
-    if len(signs) and _is_decided_by_nan(system, t, x, signs, values, traced):
-        return None
-    own = _evaluate(fun, t, x)
-    if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
-        return None
-    difference = np.abs(own - traced)
-    scale = 1.0 + float(max(np.abs(own).max(), np.abs(traced).max()))
-    component = int(difference.argmax())
-    return (component, own, traced) if difference[component] > _TOLERANCE * scale else None
+def _differing(
+    system: TracedSystem, fun: Callable[[float, Vector], Any], points: Sequence[_Point], values: Vector
+) -> list[tuple[float, Vector, Vector, Vector]]:
+    """Return the points at which the function and the trace are known and differ, with both results."""
+    compared = []
+    for t, x in points:
+        found = system.off_surfaces(t, x, values)
+        own = None if found is None else _evaluate(fun, t, x)
+        if found is not None and own is not None and own.shape == found[1].shape:
+            compared.append((t, x, own, found[1]))
+    if not compared:
+        return []
+    own, traced = (np.concatenate([row[k] for row in compared]) for k in (2, 3))
+    # Most often all components agree by themselves; else the largest one of each point is the measure.
+    if bool((np.abs(own - traced) <= _TOLERANCE * (1.0 + np.abs(traced))).all()):
+        return []
+    own, traced = own.reshape(len(compared), -1), traced.reshape(len(compared), -1)
+    size = np.maximum(np.abs(own), np.abs(traced)).max(axis=1)
+    differs = np.abs(own - traced).max(axis=1) > _TOLERANCE * (1.0 + size)
+    differs &= np.isfinite(own + traced).all(axis=1)
+    return [row for row, is_different in zip(compared, differs.tolist(), strict=True) if is_different]
 
 
-def _is_decided_by_nan(
-    system: TracedSystem, t: float, x: Vector, signs: Vector, values: Vector, traced: Vector
-) -> bool:
-    """Whether the field depends on the sign of a function that is not a number at the point."""
-    h = system.surface_values(t, x, signs, values).tolist()
-    for surface in [surface for surface, value in enumerate(h) if value != value]:
-        other = signs.copy()
-        other[surface] *= -1.0
-        if not np.array_equal(system.field(t, x, other, values), traced, equal_nan=True):
-            return True
-    return False
-
-
-def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) -> Vector | None:
-    """Return the signs of the surfaces at a point; None if the point lies on a surface.
-
-    Surfaces may contain the signs of others, so that the signs are found by iteration.
-    """
-    signs = np.ones(system.n_surfaces)
-    if system.n_surfaces == 0:
-        return signs
-    for _ in range(system.n_surfaces + 1):
-        h = system.surface_values(t, x, signs, values)
-        # NaN beyond the domain of an inactive surface: either sign will do.
-        if not (h * signs < 0.0).any():
-            tiny = 1e-13 * (1.0 + float(np.abs(x).max(initial=0.0)))
-            return None if bool((np.abs(h) <= tiny).any()) else signs
-        signs = np.where(h < 0.0, -1.0, 1.0)
-    return None
-
-
-def _point(t0: float, y0: Vector, idx: int) -> tuple[float, Vector]:
-    """Return the point to compare at: the initial one, then deterministic irregular ones around it."""
-    if idx == 0:
-        return t0, y0.copy()
-    numbers = _irregular(y0.size + 1, idx)
-    t = t0 + 0.5 * (1.0 + float(numbers[-1])) * (1.0 + 0.1 * abs(t0))
-    return t, y0 + numbers[:-1] * (1.0 + np.abs(y0))
+def _points(t0: float, y0: Vector) -> list[_Point]:
+    """Return the points to compare at: the initial one, then deterministic irregular ones around it."""
+    numbers = _irregular(y0.size + 1)
+    states = y0 + numbers[:, :-1] * (1.0 + np.abs(y0))
+    times = [t0 + 0.5 * (1.0 + number) * (1.0 + 0.1 * abs(t0)) for number in numbers[:, -1].tolist()]
+    return [(t0, y0.copy()), *zip(times, states, strict=True)]
 
 
 @lru_cache(maxsize=64)
-def _irregular(size: int, idx: int) -> Vector:
-    """Return numbers within [-1, 1] that follow no pattern, always the same."""
-    numbers = np.sin(12.9898 * np.arange(1, size + 1) + 78.233 * idx) * 43758.5453
+def _irregular(size: int) -> NDArray[np.float64]:
+    """Return rows of numbers within [-1, 1] that follow no pattern, always the same."""
+    rows = np.arange(1, N_POINTS)[:, np.newaxis]
+    numbers = np.sin(12.9898 * np.arange(1, size + 1) + 78.233 * rows) * 43758.5453
     return np.asarray(2.0 * (numbers - np.floor(numbers)) - 1.0)
 
 
 def _evaluate(fun: Callable[[float, Vector], Any], t: float, x: Vector) -> Vector | None:
     try:
-        return np.asarray(fun(t, x.copy()), dtype=float).reshape(-1)
+        # A copy: the function may return the same array at every call.
+        return np.array(fun(t, x.copy()), dtype=float).reshape(-1)
     except Exception:
         # Outside of the function's domain there is nothing to compare.
         return None

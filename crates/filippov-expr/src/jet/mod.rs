@@ -150,9 +150,7 @@ impl JetProgram {
 
 /// Operations that it takes to compute the values, each once.
 fn operations(graph: &Graph, values: &[NodeId]) -> usize {
-    let nodes = graph.reachable_by(values.iter().copied(), |id| {
-        graph.node(id).operands().collect::<Vec<_>>()
-    });
+    let nodes = graph.all_below(values);
     let is_operation = |id: &NodeId| graph.node(*id).operands().next().is_some();
     nodes.iter().filter(|id| is_operation(id)).count()
 }

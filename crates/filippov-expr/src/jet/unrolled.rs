@@ -8,6 +8,7 @@ use crate::op::{BinaryOp, UnaryOp};
 
 /// The coefficients as nodes, order by order: states, then functions.
 pub(super) fn unroll(plan: &Plan, graph: &mut Graph, order: usize) -> Vec<NodeId> {
+    graph.reserve(plan.unrolled_size(order));
     let zero = graph.constant(0.0);
     let mut table = Table::new(plan.rules.len(), order, zero);
     let mut expressions = Expressions { graph };

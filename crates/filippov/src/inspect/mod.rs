@@ -8,6 +8,7 @@ mod leg;
 mod message;
 mod mode_field;
 mod not_finite;
+mod off_surfaces;
 
 pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
@@ -15,6 +16,7 @@ pub use leg::{leg, Leg, LegError, Over};
 pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
+pub use off_surfaces::field_off_surfaces;
 
 #[cfg(test)]
 mod tests;

@@ -270,8 +270,7 @@ impl PiecewiseSystem for TracedSystem {
         let &Place { t, x, signs, q } = place;
         let p = &self.parameters;
         match self.model.field_program.native() {
-            Some(program)
-                if q.is_empty() && program.eval_native(t, x, signs, p, &[], dx) => {}
+            Some(program) if q.is_empty() && program.eval_native(t, x, signs, p, &[], dx) => {}
             _ => self.field_apart(place, dx),
         }
         Ok(())

@@ -19,6 +19,10 @@ pub const EPS: f64 = f64::EPSILON;
 /// state plus that of a few operations. Also the shortest step in units of the time: its ends are told apart.
 pub const ROUNDING: f64 = 16.0 * EPS;
 
+/// A point lies on a surface, and has no side, if the switching function is below this, relative to 1 plus the largest state: the
+/// rounding of a switching function of some hundred terms.
+pub const ON_SURFACE: f64 = 1e-13;
+
 /// Where sliding, a contact or a map takes directions from a basis, one is gone if its length is below this fraction of that of the
 /// longest: what is left of it is the rounding of products with matrices whose entries are up to some thousands.
 pub const GONE: f64 = 1e-12;

@@ -1,0 +1,58 @@
+//! The field at a point that lies on no surface.
+
+use crate::error::FieldError;
+use crate::system::{PiecewiseSystem, Setting};
+use crate::tolerances::ON_SURFACE;
+
+/// The signs of the first `n_seen` surfaces at (t, x), and the field there; `None` on a surface, and where the field depends
+/// on the sign of a function that is not a number.
+///
+/// Surfaces may contain the signs of others, so that the signs are found by iteration. `complete` adds the signs of the
+/// surfaces behind the first `n_seen`.
+///
+/// # Errors
+/// That of a function of the user.
+pub fn field_off_surfaces(
+    system: &dyn PiecewiseSystem,
+    n_seen: usize,
+    complete: impl Fn(&[f64]) -> Result<Vec<f64>, FieldError>,
+    q: &[f64],
+    (t, x): (f64, &[f64]),
+) -> Result<Option<(Vec<f64>, Vec<f64>)>, FieldError> {
+    let field = |signs: &[f64]| -> Result<Vec<f64>, FieldError> {
+        let mut dx = vec![0.0; system.n_states()];
+        system.field(&Setting::new(&complete(signs)?, q).at(t, x), &mut dx)?;
+        Ok(dx)
+    };
+    let largest = x.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    let tiny = ON_SURFACE * (1.0 + largest);
+    let mut signs = vec![1.0; n_seen];
+    let mut h = vec![0.0; system.n_surfaces()];
+    for _ in 0..=n_seen {
+        system.surfaces(&Setting::new(&complete(&signs)?, q).at(t, x), &mut h)?;
+        let seen = &h[..n_seen];
+        // NaN beyond the domain of an inactive surface: either sign will do.
+        if seen.iter().zip(&signs).any(|(h, sign)| h * sign < 0.0) {
+            signs = seen
+                .iter()
+                .map(|&h| if h < 0.0 { -1.0 } else { 1.0 })
+                .collect();
+            continue;
+        }
+        if seen.iter().any(|h| h.abs() <= tiny) {
+            return Ok(None);
+        }
+        let here = field(&signs)?;
+        for j in (0..n_seen).filter(|&j| seen[j].is_nan()) {
+            let mut other = signs.clone();
+            other[j] = -other[j];
+            let beyond = field(&other)?;
+            let agree = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+            if !here.iter().zip(&beyond).all(agree) {
+                return Ok(None);
+            }
+        }
+        return Ok(Some((signs, here)));
+    }
+    Ok(None)
+}
