@@ -131,6 +131,23 @@ def test_spellings_of_one_switching_function_are_one_surface(fun: Callable[..., 
     assert_same(traced, fun)
 
 
+
+def test_the_field_beside_surfaces_is_that_of_the_function() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [np.where(np.log(x[1]) > 0.0, 1.0, 2.0), np.sign(x[0] - np.sign(x[1]))]
+
+    system, no_values = trace_two(fun).system, np.zeros(0)
+    for x in ([0.5, 2.0], [1.5, 0.25], [0.0, 0.5]):  # the sign of x[0] - 1 is found by iteration
+        found = system.off_surfaces(0.3, np.array(x), no_values)
+        assert found is not None
+        assert found[1].tolist() == np.array(fun(0.3, np.array(x))).tolist()
+    # On a surface there is no side, and the logarithm of a negative number has no sign.
+    assert system.off_surfaces(0.3, np.array([1.0, 2.0]), no_values) is None
+    assert system.off_surfaces(0.3, np.array([0.5, -1.0]), no_values) is None
+    with pytest.raises(ValueError, match="one entry per state"):
+        system.off_surfaces(0.3, np.zeros(3), no_values)
+
+
 def test_differences_are_one_surface() -> None:
     traced = trace_two(lambda t, x: (np.sign(x[0] - x[1]), np.maximum(x[1], x[0])))
     assert traced.system.n_surfaces == 1

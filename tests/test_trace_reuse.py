@@ -491,7 +491,10 @@ USES = [
 PLACES = {
     "a variable of an outer function": "def make(k):\n    return lambda t, x: [x[1], {use}]",
     "a default": "def make(k):\n    return lambda t, x, k=k: [x[1], {use}]",
-    "a global": "def fun(t, x):\n    return [x[1], {use}]\ndef make(value):\n    global k\n    k = value\n    return fun",
+    "a global": (
+        "def fun(t, x):\n    return [x[1], {use}]\n"
+        "def make(value):\n    global k\n    k = value\n    return fun"
+    ),
     "an argument of a helper": (
         "def helper(x, k):\n    return {use}\ndef make(k):\n    return lambda t, x: [x[1], helper(x, k)]"
     ),
