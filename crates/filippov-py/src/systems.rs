@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use filippov::derivative::Extension;
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
-    field_off_surfaces, Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting,
-    SignStructure,
+    field_off_surfaces, Definition, Error, FieldError, Laws, Mode, OffSurfaces, PiecewiseSystem,
+    Rules, Setting, SignStructure,
 };
 use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names};
@@ -21,6 +21,7 @@ use crate::laws::{read_law, LawRow};
 
 pub type Array<'py> = PyReadonlyArray1<'py, f64>;
 pub type Output<'py> = Bound<'py, PyArray1<f64>>;
+type SignsAndField<'py> = (Output<'py>, Output<'py>);
 
 /// Hands an exception of a user's function back.
 pub fn raised(error: FieldError) -> PyErr {
@@ -413,7 +414,7 @@ impl TracedSystem {
         t: f64,
         x: Array<'py>,
         p: Array<'py>,
-    ) -> PyResult<Option<(Output<'py>, Output<'py>)>> {
+    ) -> PyResult<Option<SignsAndField<'py>>> {
         let x = x.as_slice()?;
         if x.len() != self.system.n_states() {
             return Err(PyValueError::new_err("x: one entry per state is needed"));
@@ -421,7 +422,9 @@ impl TracedSystem {
         let (system, q) = self.at(p.as_slice()?, t, x)?;
         let complete = |seen: &[f64]| self.all_signs((&system, &q), t, x, seen);
         let found = field_off_surfaces(&system, self.n_visible(), complete, &q, (t, x));
-        let as_arrays = |(signs, dx)| (PyArray1::from_vec(py, signs), PyArray1::from_vec(py, dx));
+        let as_arrays = |OffSurfaces { signs, field }| {
+            (PyArray1::from_vec(py, signs), PyArray1::from_vec(py, field))
+        };
         Ok(found.map_err(raised)?.map(as_arrays))
     }
 

@@ -109,7 +109,7 @@ pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, field_off_surfaces, hidden_dynamics, intersection_field, leg,
     message_of, not_finite, state_text, Classification, HiddenDynamics, HiddenRoot, Inspection,
-    IntersectionValue, Leg, LegError, NotFinitePlace, Over, PointKind,
+    IntersectionValue, Leg, LegError, NotFinitePlace, OffSurfaces, Over, PointKind,
 };
 pub use integrate::{Integrator, Problem, Reached};
 pub use mode::{Mode, Signs};

@@ -16,7 +16,7 @@ pub use leg::{leg, Leg, LegError, Over};
 pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
-pub use off_surfaces::field_off_surfaces;
+pub use off_surfaces::{field_off_surfaces, OffSurfaces};
 
 #[cfg(test)]
 mod tests;

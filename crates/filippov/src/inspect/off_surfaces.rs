@@ -4,6 +4,15 @@ use crate::error::FieldError;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::ON_SURFACE;
 
+/// A point that lies on no surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffSurfaces {
+    /// The signs of the surfaces that a user sees.
+    pub signs: Vec<f64>,
+    /// The field there.
+    pub field: Vec<f64>,
+}
+
 /// The signs of the first `n_seen` surfaces at (t, x), and the field there; `None` on a surface, and where the field depends
 /// on the sign of a function that is not a number.
 ///
@@ -18,8 +27,8 @@ pub fn field_off_surfaces(
     complete: impl Fn(&[f64]) -> Result<Vec<f64>, FieldError>,
     q: &[f64],
     (t, x): (f64, &[f64]),
-) -> Result<Option<(Vec<f64>, Vec<f64>)>, FieldError> {
-    let field = |signs: &[f64]| -> Result<Vec<f64>, FieldError> {
+) -> Result<Option<OffSurfaces>, FieldError> {
+    let field_with = |signs: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut dx = vec![0.0; system.n_states()];
         system.field(&Setting::new(&complete(signs)?, q).at(t, x), &mut dx)?;
         Ok(dx)
@@ -42,17 +51,17 @@ pub fn field_off_surfaces(
         if seen.iter().any(|h| h.abs() <= tiny) {
             return Ok(None);
         }
-        let here = field(&signs)?;
+        let here = field_with(&signs)?;
         for j in (0..n_seen).filter(|&j| seen[j].is_nan()) {
             let mut other = signs.clone();
             other[j] = -other[j];
-            let beyond = field(&other)?;
+            let beyond = field_with(&other)?;
             let agree = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
             if !here.iter().zip(&beyond).all(agree) {
                 return Ok(None);
             }
         }
-        return Ok(Some((signs, here)));
+        return Ok(Some(OffSurfaces { signs, field: here }));
     }
     Ok(None)
 }
