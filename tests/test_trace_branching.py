@@ -131,7 +131,6 @@ def test_spellings_of_one_switching_function_are_one_surface(fun: Callable[..., 
     assert_same(traced, fun)
 
 
-
 def test_the_field_beside_surfaces_is_that_of_the_function() -> None:
     def fun(t: Any, x: Any) -> Any:
         return [np.where(np.log(x[1]) > 0.0, 1.0, 2.0), np.sign(x[0] - np.sign(x[1]))]
