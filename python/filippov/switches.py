@@ -620,7 +620,7 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
         t, surfaces = lands_on
         met = tuple(names[j] for j in surfaces if j < len(names))
         what = f"is put on {', '.join(met)} = 0 by an action at t = {t:.10g}"
-        borders.append(Border(what, "from there on", met, t))
+        borders.append(Border(what, "by what moves it off", met, t))
     if starts_at_action:
         borders.append(Border("starts at the very time of an action", "by the initial time"))
     if starts_at_tick:

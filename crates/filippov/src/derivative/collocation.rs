@@ -96,7 +96,9 @@ impl Collocation {
                 _ => right.fill(f64::NAN),
             }
             let block = right.len() / STAGES;
-            let end = column[..self.n].iter_mut().zip(&right[(STAGES - 1) * block..]);
+            let end = column[..self.n]
+                .iter_mut()
+                .zip(&right[(STAGES - 1) * block..]);
             let end = end.zip(&self.units);
             end.for_each(|((entry, value), unit)| *entry = unit * value);
         }

@@ -310,7 +310,8 @@ impl<'a> Tangents<'a> {
             let start = self.t_start.unwrap_or(record.t[0]);
             self.found.borders.starts_at_action |=
                 is_missed_later(self.around.extended, record, start, &self.kinds);
-            if let (None, None, Some(last)) = (&self.found.borders.lands_on, self.lost, all.last()) {
+            if let (None, None, Some(last)) = (&self.found.borders.lands_on, self.lost, all.last())
+            {
                 let landed = surfaces_landed_on(&mut after, record, &last.dt, &self.columns)?;
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
