@@ -412,7 +412,7 @@ def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:
 
     put = fl.Reset(times=[1.0], map=lambda t, x: [0.5])
     system = fl.System(fun, n=1, resets=[put])
-    # The level above 0.5 is crossed later, with three times the speed until then; below it is never met again.
+    # A level above 0.5 is crossed later, with three times the speed until then; one below is never met again.
     with pytest.warns(
         fl.FilippovWarning, match=r"one_sided: the run is put on x\[0\] - level = 0 by an action at t = 1"
     ):
@@ -433,7 +433,7 @@ def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_states_of_very_different_size(method: str) -> None:
-    # x0 = y0 exp(t), x1 = exp(exp(t) - 1): a change of x1 is 1e27 times that of x0, which does not depend on it.
+    # x0 = exp(t), x1 = exp(exp(t) - 1): a change of x1 is 1e27 times that of x0, which does not depend on it.
     system = fl.System(lambda t, x: [x[0], x[0] * x[1]], n=2)
     sol = system.solve((0.0, 4.2), [1.0, 1.0], method=method, rtol=1e-10, atol=1e-10, wrt=["y0"])
     for t in (4.0, float(sol.t[-5]) + 1e-12, 4.2):
