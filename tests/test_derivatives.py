@@ -433,7 +433,7 @@ def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_states_of_very_different_size(method: str) -> None:
-    # x0 = exp(t), x1 = exp(exp(t) - 1): a change of x1 is 1e27 times that of x0, whose rate is without it.
+    # x0 = exp(t), x1 = exp(exp(t) - 1): a change of x1 is 1e27 times that of x0, whose rate has no x1.
     system = fl.System(lambda t, x: [x[0], x[0] * x[1]], n=2)
     sol = system.solve((0.0, 4.2), [1.0, 1.0], method=method, rtol=1e-10, atol=1e-10, wrt=["y0"])
     for t in (4.0, float(sol.t[-5]) + 1e-12, 4.2):
