@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import pickle
+import warnings
 from typing import Any
 
 import filippov as fl
@@ -403,6 +404,42 @@ def test_a_start_whose_sides_differ_is_named(fun: Any, y0: Any, surface: str, sl
     assert surface in sol.warnings[-1].surfaces
     if slope is not None:
         assert sol.derivative()[-1, 0] == pytest.approx(slope)
+
+
+def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:
+    def fun(t: float, x: Any, level: float = 0.5) -> list[Any]:
+        return [1.0 if x[0] > level else 3.0]
+
+    put = fl.Reset(times=[1.0], map=lambda t, x: [0.5])
+    system = fl.System(fun, n=1, resets=[put])
+    # A level above 0.5 is crossed later, with three times the speed until then; one below is never met again.
+    with pytest.warns(
+        fl.FilippovWarning, match=r"one_sided: the run is put on x\[0\] - level = 0 by an action at t = 1"
+    ):
+        sol = system.solve((0.0, 2.0), [0.0], wrt=["level"])
+    assert sol.derivative() == 0.0
+    d = 1e-6
+    ends = [system.solve((0.0, 2.0), [0.0], level=0.5 + side * d).y[0, -1] for side in (-1, 0, 1)]
+    assert ends[0] == ends[1] == 1.5
+    assert (ends[2] - ends[1]) / d == pytest.approx(2 / 3, abs=1e-6)
+    with pytest.warns(fl.FilippovWarning, match="the gradient by what moves it off is that of one side"):
+        fl.gradient(system, (0.0, 2.0), [0.0], terminal=lambda t, x: x[0], wrt=["level"])
+    # By the initial state nothing moves the state off the surface.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        moved = system.solve((0.0, 2.0), [0.0], wrt=["y0"])
+    assert moved.derivative() == 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_states_of_very_different_size(method: str) -> None:
+    # x0 = exp(t), x1 = exp(exp(t) - 1): a change of x1 is 1e27 times that of x0, whose rate has no x1.
+    system = fl.System(lambda t, x: [x[0], x[0] * x[1]], n=2)
+    sol = system.solve((0.0, 4.2), [1.0, 1.0], method=method, rtol=1e-10, atol=1e-10, wrt=["y0"])
+    for t in (4.0, float(sol.t[-5]) + 1e-12, 4.2):
+        found, grown = sol.derivative(t), math.exp(math.exp(t) - 1)
+        np.testing.assert_allclose(found[0], [math.exp(t), 0.0], rtol=1e-8)
+        np.testing.assert_allclose(found[1], [grown * (math.exp(t) - 1), grown], rtol=1e-6)
 
 
 def test_a_start_on_the_surface_of_a_reset_has_the_shift_of_its_time() -> None:

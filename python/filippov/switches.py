@@ -594,8 +594,9 @@ _WHY_LOST = {
 }
 
 
-# The surfaces on which a run starts; whether an action, or a tick, is at its start, and a switch at its end.
-Borders: TypeAlias = "tuple[list[int], bool, bool, bool]"
+# The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an action,
+# or a tick, is at its start, and a switch at its end.
+Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool]"
 
 
 class Border(NamedTuple):
@@ -604,16 +605,22 @@ class Border(NamedTuple):
     what: str
     whose: str
     surfaces: tuple[str, ...] = ()
+    t: float | None = None
     is_end: bool = False
 
 
 def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -> list[Border]:
     """Return where the derivatives of a run are those of one side, from what the core found."""
-    starts_on, starts_at_action, starts_at_tick, ends_at_instant = found
+    starts_on, lands_on, starts_at_action, starts_at_tick, ends_at_instant = found
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
     if left:
         borders.append(Border(f"starts on {', '.join(left)} = 0", "by the start", left))
+    if lands_on:
+        t, surfaces = lands_on
+        met = tuple(names[j] for j in surfaces if j < len(names))
+        what = f"is put on {', '.join(met)} = 0 by an action at t = {t:.10g}"
+        borders.append(Border(what, "by what moves it off", met, t))
     if starts_at_action:
         borders.append(Border("starts at the very time of an action", "by the initial time"))
     if starts_at_tick:
@@ -629,7 +636,8 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
     found = []
     for border in borders_of(run.borders(), run.status == 0, names):
         text = f"the run {border.what}: derivatives {border.whose} are those of one side"
-        found.append(RunWarning(run.t_last if border.is_end else t0, "one_sided", text, (), border.surfaces))
+        t = run.t_last if border.is_end else t0 if border.t is None else border.t
+        found.append(RunWarning(t, "one_sided", text, (), border.surfaces))
     lost = run.derivatives_lost()
     if lost is not None:
         t, why = lost

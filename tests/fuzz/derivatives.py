@@ -170,6 +170,8 @@ def compare(seed: int) -> Compared:
                 found.unsettled.append(column)
                 continue
             found.wrong.append(f"d/d{column}: {own} is not {near[0][0]}, known to {near[0][1]:.1e}")
+        elif not is_smooth and not is_named and _has_no_kink(quotients):
+            found.unsettled.append(column)
         elif not is_smooth and not is_named:
             found.wrong.append(f"d/d{column}: two sides without a warning")
         else:

@@ -39,14 +39,15 @@ pub type SideRow<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// The surfaces on which a run starts; is an action done at the initial time, does a clock tick there, and does the run end at an
+/// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial time, does a clock tick there, and does the run end at an
 /// instant that moves?
-pub type BordersRow = (Vec<usize>, bool, bool, bool);
+pub type BordersRow = (Vec<usize>, Option<(f64, Vec<usize>)>, bool, bool, bool);
 
 /// The same, for Python.
 pub fn borders_row(borders: &Borders) -> BordersRow {
     (
         borders.starts_on.clone(),
+        borders.lands_on.clone(),
         borders.starts_at_action,
         borders.starts_at_tick,
         borders.ends_at_instant,

@@ -6,7 +6,9 @@
 //! same at all times, to rounding.
 
 use super::between::{state_at, EventGradient};
-use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::borders::{
+    differ, is_missed_later, surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders,
+};
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
@@ -384,7 +386,10 @@ impl<'w> Walk<'w> {
             }
         } else {
             match instant.through(&weights, &mut 0.0)? {
-                Ok(passages) => self.pull_back(record, &passages, n),
+                Ok(passages) => {
+                    self.land(record, instant.after, &passages)?;
+                    self.pull_back(record, &passages, n)
+                }
                 Err(lost) => return Ok(Some(lost.name())),
             }
         };
@@ -420,6 +425,34 @@ impl<'w> Walk<'w> {
         }
         let is_finite = self.w.iter().all(|value| value.is_finite());
         Ok((!is_finite).then_some("not_finite"))
+    }
+
+    /// Notes on which surfaces actions put the state, for changes of the state before them and of what is asked for.
+    fn land(
+        &mut self,
+        record: &InstantRecord,
+        after: &mut Piece,
+        passages: &[Passage],
+    ) -> Result<(), FieldError> {
+        let extended = after.extended;
+        let Some(last) = passages.last().filter(|_| !record.acts.is_empty()) else {
+            return Ok(());
+        };
+        let states = (0..extended.n).map(Column::State);
+        let others = self.run.kinds.iter().copied();
+        let parameters = others.filter(|kind| matches!(kind, Column::Parameter(_)));
+        let kinds: Vec<Column> = states.chain(parameters).collect();
+        let mut columns = extended.columns_at_start(&kinds, &[]);
+        let dt: Vec<f64> = columns.iter().map(|c| dot(&last.time, c)).collect();
+        for column in &mut columns {
+            let changes = passages.iter().flat_map(|passage| &passage.changes);
+            changes.for_each(|change| change.apply(extended.n, column));
+        }
+        let landed = surfaces_landed_on(after, record, &dt, &columns)?;
+        if !landed.is_empty() {
+            self.borders.lands_on = Some((record.t[1], landed));
+        }
+        Ok(())
     }
 
     /// Takes the gradient back through what happens at an instant; returns the derivative of the time of the guard.

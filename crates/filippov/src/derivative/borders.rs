@@ -1,18 +1,21 @@
-//! Where a run begins or ends at something that a changed run misses.
+//! Where a run begins, lands or ends at something that a changed run misses.
 
 use super::extended::{Column, Extended};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
+use crate::motion::Guard;
 use crate::record::InstantRecord;
-use crate::system::{LieDerivatives, PiecewiseSystem, SignStructure};
+use crate::system::{Act, LieDerivatives, PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
 /// Why derivatives are those of one side: what the start or the end of a run coincides with.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Borders {
     /// Surfaces on which the run starts and at which the sides differ: derivatives by the start.
     pub starts_on: Vec<usize>,
+    /// The first time at which an action puts the state on surfaces at which the sides differ, and these: all derivatives from there.
+    pub lands_on: Option<(f64, Vec<usize>)>,
     /// An action at the initial time, which a run that begins later misses: derivatives by the initial time.
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
@@ -40,14 +43,56 @@ pub(super) fn is_missed_later(
     record.t[0] == start && !record.acts.is_empty() && changes && kinds.contains(&Column::Start)
 }
 
-/// The surfaces through a start at which the sides differ, if one of these columns, as they are before the motion acts on them, moves
-/// the start off them: surfaces that the motion leaves where the field jumps, or does not leave where its derivative jumps; and those
-/// that it slides on, if the way there is another one from each corner.
+/// The surfaces on which actions put the state, and at which the sides differ for one of these columns behind the actions; `dt` are the
+/// derivatives of their time.
+pub(super) fn surfaces_landed_on(
+    piece: &mut Piece,
+    record: &InstantRecord,
+    dt: &[f64],
+    columns: &[Vec<f64>],
+) -> Result<Vec<usize>, FieldError> {
+    if record.acts.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (t, field) = (record.t[1], record.field[1]);
+    let z = piece.extended.state(record.x[1]);
+    let moved = |(&dt, column): (&f64, &Vec<f64>)| {
+        let mut place = column.clone();
+        let entries = place.iter_mut().zip(field);
+        entries.for_each(|(entry, rate)| *entry += rate * dt);
+        (dt, place)
+    };
+    let moved: Vec<_> = dt.iter().zip(columns).map(moved).collect();
+    let mut found = surfaces_with_sides(piece, (t, &z), &moved)?;
+    // What an action happens on is met by a changed run too.
+    let own = |act: &Act| piece.extended.surface_of(act.index);
+    let own: Vec<usize> = record.acts.iter().filter_map(own).collect();
+    let reached = |j: &usize| own.contains(j) || record.guards.contains(&Guard::Surface(*j));
+    found.retain(|j| !reached(j));
+    Ok(found)
+}
+
+/// The surfaces through a start at which the sides differ for one of these columns, as they are before the motion acts on them.
 pub(super) fn surfaces_at_start(
     piece: &mut Piece,
-    (t, z): (f64, &[f64]),
+    at: (f64, &[f64]),
     kinds: &[Column],
     columns: &[Vec<f64>],
+) -> Result<Vec<usize>, FieldError> {
+    let later = |kind: &Column| f64::from(*kind == Column::Start);
+    let moved = kinds.iter().zip(columns);
+    let moved: Vec<_> = moved
+        .map(|(kind, column)| (later(kind), column.clone()))
+        .collect();
+    surfaces_with_sides(piece, at, &moved)
+}
+
+/// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces that the motion leaves where the field jumps, or does not leave where its derivative jumps; and those
+/// that it slides on, if the way there is another one from each corner.
+fn surfaces_with_sides(
+    piece: &mut Piece,
+    (t, z): (f64, &[f64]),
+    changes: &[(f64, Vec<f64>)],
 ) -> Result<Vec<usize>, FieldError> {
     let h = piece.surfaces(t, z)?;
     let field = piece.rates(t, z)?;
@@ -62,11 +107,12 @@ pub(super) fn surfaces_at_start(
         }
         let mut normal = vec![0.0; z.len()];
         let by_time = piece.gradient(j, t, z, &mut normal)?;
-        let moves = |(kind, column): (&Column, &Vec<f64>)| {
-            let later = f64::from(*kind == Column::Start);
-            by_time * later + dot(&normal, column) != 0.0
+        let moves = |(time, state): &(f64, Vec<f64>)| {
+            let terms = normal.iter().zip(state).map(|(g, v)| (g * v).abs());
+            let size = (by_time * time).abs() + terms.sum::<f64>();
+            (by_time * time + dot(&normal, state)).abs() > ROUNDING * size
         };
-        if !kinds.iter().zip(columns).any(moves) {
+        if !changes.iter().any(moves) {
             continue;
         }
         let has_sides = match piece.mode.entries()[j] {

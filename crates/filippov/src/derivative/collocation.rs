@@ -30,6 +30,8 @@ pub(super) struct Collocation {
     /// The right-hand side of the matrix, by the change at the start with the shares of the parameters behind it.
     right: SparseRows,
     sparse: SparseSolver,
+    /// In what the changes of the states are measured in the full matrix.
+    units: Vec<f64>,
     /// What iterations need of each node.
     nodes: Vec<Node>,
 }
@@ -66,13 +68,14 @@ impl Collocation {
             way: Way::Sparse(false),
             right: SparseRows::new(n + m),
             sparse: SparseSolver::for_all_pivots(),
+            units: vec![1.0; n],
             nodes: Vec::new(),
         }
     }
 
     /// Carries changes on over a part of this length, each of n states with the shares of the parameters behind them.
     pub fn carry(&mut self, nodes: &[Linearisation], dt: f64, columns: &mut [Vec<f64>]) {
-        self.take(nodes, dt, columns.len());
+        self.take(nodes, dt, columns);
         if matches!(self.way, Way::Iteration) {
             let found: Option<Vec<Vec<f64>>> =
                 columns.iter().map(|c| self.iterate(nodes, c)).collect();
@@ -93,14 +96,18 @@ impl Collocation {
                 _ => right.fill(f64::NAN),
             }
             let block = right.len() / STAGES;
-            column[..self.n].copy_from_slice(&right[(STAGES - 1) * block..][..self.n]);
+            let end = column[..self.n]
+                .iter_mut()
+                .zip(&right[(STAGES - 1) * block..]);
+            let end = end.zip(&self.units);
+            end.for_each(|((entry, value), unit)| *entry = unit * value);
         }
     }
 
     /// Takes the gradient of a function by the state at the end of a part back to the start, and adds to the shares of the
     /// parameters.
     pub fn pull_back(&mut self, nodes: &[Linearisation], dt: f64, gradient: &mut [f64]) {
-        self.take(nodes, dt, 1);
+        self.take(nodes, dt, &[]);
         if matches!(self.way, Way::Iteration) {
             if self.iterate_back(nodes, gradient) {
                 return;
@@ -123,17 +130,23 @@ impl Collocation {
         }
     }
 
-    /// Chooses the way for so many changes.
-    fn take(&mut self, nodes: &[Linearisation], dt: f64, n_changes: usize) {
+    /// Chooses the way for these changes, or for one on the way back.
+    fn take(&mut self, nodes: &[Linearisation], dt: f64, columns: &[Vec<f64>]) {
         self.dt = dt;
         self.way = Way::Sparse(false);
+        self.units.fill(1.0);
         if self.n <= MOST_FULL {
+            for (r, unit) in self.units.iter_mut().enumerate() {
+                let largest = columns.iter().fold(0.0_f64, |most, c| most.max(c[r].abs()));
+                *unit = power_of_two_below(largest);
+            }
             if let Some(elimination) = self.factor_full(nodes) {
                 self.way = Way::Full(elimination);
                 return;
             }
+            self.units.fill(1.0);
         }
-        if n_changes > MOST_ITERATED {
+        if columns.len() > MOST_ITERATED {
             self.way = Way::Sparse(self.factor_sparse(nodes, false));
             return;
         }
@@ -246,7 +259,8 @@ impl Collocation {
         }
     }
 
-    /// The full matrix, with the multipliers eliminated; `None` where they have no solution.
+    /// The full matrix, with the multipliers eliminated; `None` where they have no solution. Its rows, and its unknowns, are divided by
+    /// powers of two: no digit is lost, and pivots are chosen well where states are of very different size.
     fn factor_full(&mut self, nodes: &[Linearisation]) -> Option<Elimination> {
         let (n, m, dt) = (self.n, self.m, self.dt);
         let n_multipliers = nodes[0].rows().n_rows() - n - m;
@@ -259,16 +273,19 @@ impl Collocation {
             for r in 0..n {
                 let row = &slopes[r * (n + m)..][..n + m];
                 for (j, weight) in WEIGHTS[i].iter().enumerate() {
-                    matrix[(i * n + r, j * n + r)] = *weight;
+                    matrix[(i * n + r, j * n + r)] = self.units[r] * weight;
                 }
                 for (c, slope) in row[..n].iter().enumerate() {
-                    matrix[(i * n + r, i * n + c)] -= dt * slope;
+                    matrix[(i * n + r, i * n + c)] -= self.units[c] * dt * slope;
                 }
+                let entries = (0..STAGES * n).map(|k| matrix[(i * n + r, k)].abs());
+                let scale = 1.0 / power_of_two_below(entries.fold(0.0, f64::max));
+                (0..STAGES * n).for_each(|k| matrix[(i * n + r, k)] *= scale);
                 let by_parameters = row[n..].iter().enumerate();
                 let by_parameters = by_parameters.filter(|(_, slope)| **slope != 0.0);
-                let by_parameters = by_parameters.map(|(p, slope)| (n + p, dt * slope));
-                self.right
-                    .push_row([(r, sum)].into_iter().chain(by_parameters));
+                let by_parameters = by_parameters.map(|(p, slope)| (n + p, scale * dt * slope));
+                let own = [(r, scale * sum)];
+                self.right.push_row(own.into_iter().chain(by_parameters));
             }
         }
         Some(Elimination::of(matrix))
@@ -314,6 +331,15 @@ impl Collocation {
             matrix = matrix.transposed();
         }
         matrix.is_finite() && self.sparse.factor(&matrix).is_ok()
+    }
+}
+
+/// The largest power of two that is not above a positive normal number; 1 for others.
+fn power_of_two_below(size: f64) -> f64 {
+    let digits = (1_u64 << (f64::MANTISSA_DIGITS - 1)) - 1;
+    match size.is_normal() {
+        true => f64::from_bits(size.to_bits() & !digits),
+        false => 1.0,
     }
 }
 

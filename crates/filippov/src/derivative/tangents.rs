@@ -1,6 +1,8 @@
 //! The derivatives of a run, as its observer.
 
-use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::borders::{
+    differ, is_missed_later, surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders,
+};
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
@@ -308,6 +310,12 @@ impl<'a> Tangents<'a> {
             let start = self.t_start.unwrap_or(record.t[0]);
             self.found.borders.starts_at_action |=
                 is_missed_later(self.around.extended, record, start, &self.kinds);
+            if let (None, None, Some(last)) = (&self.found.borders.lands_on, self.lost, all.last())
+            {
+                let landed = surfaces_landed_on(&mut after, record, &last.dt, &self.columns)?;
+                let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
+                self.found.borders.lands_on = lands_on;
+            }
             let replaced = record.replaces.then_some(Lost::Accumulation);
             for mut found in all {
                 found.lost = self.lost.or(replaced).or(found.lost);
