@@ -21,11 +21,20 @@
 
 #[cfg(target_arch = "wasm32")]
 mod abi;
+mod arrays;
 mod calls;
+mod constants_of_motion;
 mod expressions;
+mod laws;
+mod model;
 mod module;
+mod numpy;
+mod parts;
+mod questions;
+mod reader;
 mod reply;
 mod statements;
+mod tables;
 mod tracer;
 mod unreadable;
 mod values;
