@@ -146,7 +146,12 @@ REFUSED = {
     "def f(t, x):\n    y = x\n    y += 1\n    return y": (3, 5, "in place"),
     "def f(t, x):\n    return np.sign(np.array([x[0], x[1]]))": (2, 12, "np.stack"),
     "def f(t, x):\n    return np.array([x[0], x[1]]) > 0": (2, 37, "np.stack"),
-    "def f(t, x):\n    return np.floor(np.where(x[0] > 0, 1.5 * x[0] + 1, x[0]))": (2, 12, ""),
+    "import filippov as fl\ndef f(t, x):\n    return fl.hysteresis(np.where(x[0] > 0, x[0] + 1, x[0]), -1, 1)": (
+        3,
+        12,
+        "jumps",
+    ),
+    "def f(t, x):\n    return -np.sign(np.interp(x[0], [0, 1, 2, 3], [-1, 0, 0, 1]))": (2, 13, "stands still"),
     "def f(t, x):\n    return np.exp(2.0) - x[0]": (2, 12, "platform"),
     "def f(t, x):\n    return [i for i in range(10**9)]": (2, 24, "range"),
     "import filippov as fl\ndef f(t, x):\n    return x\nm = fl.System(f, n=2, surfaces=[f])": (4, 5, "surfaces"),

@@ -1,5 +1,6 @@
 //! Laws with memory in a trace, each with a discrete state of its own: what `python/filippov/trace/laws.py` does.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use filippov::{Law, Rules, Step};
@@ -365,39 +366,27 @@ impl Laws {
     }
 
     /// Does an expression of tables stand still in some of their pieces?
-    pub fn stands_still_in_pieces(tracer: &Tracer, node: NodeId) -> bool {
+    pub fn stands_still_in_pieces(tracer: &mut Tracer, node: NodeId) -> bool {
         if tracer.laws.is_empty() || !tracer.graph.depends_on_motion(node) {
             return false;
         }
-        let read = Laws::read(tracer, node);
-        let places = read.iter().filter_map(|&index| match &tracer.laws.forms[index] {
-            Form::Entry(place, ..) => Some(*place),
-            _ => None,
-        });
-        let mut copy = tracer.graph.clone();
-        let zero = copy.constant(0.0);
-        places.into_iter().any(|place| {
-            let mut rows = Vec::new();
-            for &index in &read {
-                if let Form::Entry(of, first, list) = &tracer.laws.forms[index] {
-                    if *of == place {
-                        rows.push(((tracer.laws.first + index) as u32, *first, list));
-                    }
+        let mut tables: Vec<(NodeId, Vec<Row>)> = Vec::new();
+        for index in Laws::read(tracer, node) {
+            if let Form::Entry(place, first, list) = &tracer.laws.forms[index] {
+                let state = (tracer.laws.first + index) as u32;
+                let is_zero = list.iter().map(|entry| *entry == 0.0).collect();
+                let row = Row {
+                    state,
+                    first: *first,
+                    is_zero,
+                };
+                match tables.iter_mut().find(|(known, _)| known == place) {
+                    Some((_, rows)) => rows.push(row),
+                    None => tables.push((*place, vec![row])),
                 }
             }
-            let lengths = |row: &(u32, f64, &Vec<f64>)| (row.1.to_bits(), row.2.len());
-            if rows.iter().any(|row| lengths(row) != lengths(&rows[0])) {
-                return false;
-            }
-            (0..rows[0].2.len()).any(|column| {
-                let zeros = rows.iter().filter(|row| row.2[column] == 0.0);
-                let images: Vec<(NodeId, NodeId)> = zeros
-                    .map(|row| (copy.parameter(row.0), zero))
-                    .collect();
-                let still = copy.substituted(node, &images);
-                !images.is_empty() && !copy.depends_on_motion(still)
-            })
-        })
+        }
+        tables.iter().any(|(_, rows)| still(tracer, node, rows))
     }
 
     /// Declares the surfaces at which discrete states change, behind all others; the new numbers of those before, and the rules.
@@ -571,6 +560,35 @@ impl Laws {
         };
         self.forms.iter().flat_map(of).collect()
     }
+}
+
+/// Where the entries of a list are zero.
+struct Row {
+    state: u32,
+    first: f64,
+    is_zero: Vec<bool>,
+}
+
+/// Does an expression stand still where entries of these lists, which are read at one place, are zero?
+fn still(tracer: &mut Tracer, node: NodeId, rows: &[Row]) -> bool {
+    let shape = |row: &Row| (row.first.to_bits(), row.is_zero.len());
+    if rows.iter().any(|row| shape(row) != shape(&rows[0])) {
+        return false;
+    }
+    let graph = &mut tracer.graph;
+    let zero = graph.constant(0.0);
+    let pattern = |k: usize| rows.iter().map(|row| row.is_zero[k]).collect::<Vec<bool>>();
+    let patterns: BTreeSet<Vec<bool>> = (0..rows[0].is_zero.len()).map(pattern).collect();
+    let mut stands_still = false;
+    for pattern in patterns {
+        let zeros = rows.iter().zip(pattern).filter(|(_, is_zero)| *is_zero);
+        let images: Vec<(NodeId, NodeId)> = zeros
+            .map(|(row, _)| (graph.parameter(row.state), zero))
+            .collect();
+        let still = graph.substituted(node, &images);
+        stands_still |= !images.is_empty() && !graph.depends_on_motion(still);
+    }
+    stands_still
 }
 
 /// The end of a range if it is a whole number.

@@ -41,8 +41,10 @@ pub fn check_questions(
     }
     let open = vec![None; regions.graph().n_surfaces()];
     for (question, surface) in tracer.questions.iter().zip(&surface_of) {
-        let is_used = surface.is_none_or(|surface| regions.matters(&roots, &open, surface));
-        if is_used && tracer.unresolved.contains(&question.node) {
+        if !tracer.unresolved.contains(&question.node) {
+            continue;
+        }
+        if surface.is_none_or(|surface| regions.matters(&roots, &open, surface)) {
             let error = "whether this is 0 in some region is not found out: it has too many signs inside";
             return refuse(&question.place, error);
         }

@@ -595,9 +595,9 @@ impl Tracer {
             .collect();
         parts.push(argument);
         for inner in parts {
-            let root = self.root_of(inner, of);
             let inside = self.unary(UnaryOp::NotNegative, inner);
             let continued = self.root_of(inside, of);
+            let root = self.root_of(inner, of);
             match self.continued.iter_mut().find(|known| known.0 == root) {
                 Some(known) => known.1 = continued,
                 None => self.continued.push((root, continued)),
