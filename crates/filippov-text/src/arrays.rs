@@ -11,8 +11,7 @@ use crate::unreadable::{refuse, Refused};
 use crate::values::{Array, List, Value};
 
 /// What is done to the elements of two arrays in the same place.
-pub type OfTwo<'f, 'a> =
-    dyn FnMut(&mut Reader<'a>, &Value, &Value) -> Result<Value, Refused> + 'f;
+pub type OfTwo<'f, 'a> = dyn FnMut(&mut Reader<'a>, &Value, &Value) -> Result<Value, Refused> + 'f;
 
 /// What is done to an element.
 pub type OfOne<'f, 'a> = dyn FnMut(&mut Reader<'a>, &Value) -> Result<Value, Refused> + 'f;
@@ -47,12 +46,18 @@ pub fn array_of(part: &impl Ranged, value: &Value) -> Result<Rc<Array>, Refused>
         let width = inner[0].shape[0];
         let is_even = |row: &Rc<Array>| row.shape.len() == 1 && row.shape[0] == width;
         if !inner.iter().all(is_even) {
-            return refuse(part, "the rows of an array have one length, and arrays two axes at most");
+            return refuse(
+                part,
+                "the rows of an array have one length, and arrays two axes at most",
+            );
         }
         let items = inner.iter().flat_map(|row| row.items.borrow().clone());
         (vec![inner.len(), width], items.collect())
     } else {
-        return refuse(part, "an array is read with numbers, or with rows of numbers, in one list");
+        return refuse(
+            part,
+            "an array is read with numbers, or with rows of numbers, in one list",
+        );
     };
     // Of numbers NumPy makes one type.
     let is_number = |item: &Value| item.number().is_some();
@@ -88,19 +93,20 @@ impl<'a> Reader<'a> {
             return function(self, a, b);
         }
         let is_traced = a.is_traced() || b.is_traced();
-        let [(shape_a, items_a), (shape_b, items_b)] = [a, b].map(|value| match value {
-            Value::Array(array) => Ok((array.shape.clone(), array.items.borrow().clone())),
-            Value::List(_) => {
-                let array = array_of(part, value)?;
-                let items = array.items.borrow().clone();
-                Ok((array.shape.clone(), items))
-            }
-            scalar => Ok((Vec::new(), vec![scalar.clone()])),
-        })
-        .into_iter()
-        .collect::<Result<Vec<_>, Refused>>()?
-        .try_into()
-        .unwrap_or_else(|_| [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())]);
+        let [(shape_a, items_a), (shape_b, items_b)] = [a, b]
+            .map(|value| match value {
+                Value::Array(array) => Ok((array.shape.clone(), array.items.borrow().clone())),
+                Value::List(_) => {
+                    let array = array_of(part, value)?;
+                    let items = array.items.borrow().clone();
+                    Ok((array.shape.clone(), items))
+                }
+                scalar => Ok((Vec::new(), vec![scalar.clone()])),
+            })
+            .into_iter()
+            .collect::<Result<Vec<_>, Refused>>()?
+            .try_into()
+            .unwrap_or_else(|_| [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())]);
         let rank = shape_a.len().max(shape_b.len());
         let padded = |shape: &[usize]| [vec![1; rank - shape.len()], shape.to_vec()].concat();
         let (wide_a, wide_b) = (padded(&shape_a), padded(&shape_b));
@@ -158,7 +164,10 @@ impl<'a> Reader<'a> {
     ) -> Result<Value, Refused> {
         let is_array = |value: &Value| matches!(value, Value::Array(_));
         if !is_array(a) && !is_array(b) {
-            return refuse(part, "a product of matrices is read of arrays: write np.array([...])");
+            return refuse(
+                part,
+                "a product of matrices is read of arrays: write np.array([...])",
+            );
         }
         let (a, b) = (as_array(part, a)?, as_array(part, b)?);
         let is_traced = a.is_traced || b.is_traced;
@@ -177,7 +186,10 @@ impl<'a> Reader<'a> {
         let skips_zeros_of_a = a.shape.len() == 2 && a.is_of_numbers();
         let skips_zeros_of_b = !skips_zeros_of_a && b.shape.len() == 2 && b.is_of_numbers();
         if a.is_of_numbers() && b.is_of_numbers() {
-            return refuse(part, "a product of matrices of numbers is not read here: write its value");
+            return refuse(
+                part,
+                "a product of matrices of numbers is not read here: write its value",
+            );
         }
         let (items_a, items_b) = (a.items.borrow().clone(), b.items.borrow().clone());
         let at = |row: usize, column: usize, k: usize| {
@@ -231,7 +243,10 @@ impl<'a> Reader<'a> {
                 let count = list.items.borrow().len();
                 let items = |places: Vec<usize>| {
                     let items = list.items.borrow();
-                    places.into_iter().map(|place| items[place].clone()).collect::<Vec<_>>()
+                    places
+                        .into_iter()
+                        .map(|place| items[place].clone())
+                        .collect::<Vec<_>>()
                 };
                 match self.taken(index, count)? {
                     Taken::One(place) => Ok(list.items.borrow()[place].clone()),
@@ -297,7 +312,10 @@ impl<'a> Reader<'a> {
             Taken::Some(places) => places.clone(),
         };
         let found: Vec<Value> = match &taken[..] {
-            [first] => places(first).into_iter().map(|k| items[k].clone()).collect(),
+            [first] => places(first)
+                .into_iter()
+                .map(|k| items[k].clone())
+                .collect(),
             [rows, columns] => {
                 let width = array.shape[1];
                 let columns = places(columns);
@@ -320,7 +338,10 @@ impl<'a> Reader<'a> {
         let value = self.value(index)?;
         let place = match value {
             Value::Node(node) => self.tracer.known_integer(node).map(|place| place as f64),
-            Value::Number { value, is_whole: true } => Some(value),
+            Value::Number {
+                value,
+                is_whole: true,
+            } => Some(value),
             Value::Truth(holds) => Some(f64::from(u8::from(holds))),
             Value::Condition(condition) => {
                 Some(f64::from(u8::from(self.tracer.decide(&condition))))
@@ -330,7 +351,11 @@ impl<'a> Reader<'a> {
         let Some(place) = place else {
             return refuse(index, "an index is a whole number, or a slice");
         };
-        let place = if place < 0.0 { place + count as f64 } else { place };
+        let place = if place < 0.0 {
+            place + count as f64
+        } else {
+            place
+        };
         match place >= 0.0 && place < count as f64 {
             true => Ok(Taken::One(place as usize)),
             false => refuse(index, format!("there are {count} entries, from index 0")),
@@ -343,7 +368,11 @@ impl<'a> Reader<'a> {
             Some(Expr::NoneLiteral(_)) => Ok(None),
             Some(bound) => Ok(Some(self.whole_number(bound)?)),
         };
-        let (lower, upper, step) = (bound(&slice.lower)?, bound(&slice.upper)?, bound(&slice.step)?);
+        let (lower, upper, step) = (
+            bound(&slice.lower)?,
+            bound(&slice.upper)?,
+            bound(&slice.step)?,
+        );
         let (step, n) = (step.unwrap_or(1), count as i64);
         if step == 0 {
             return refuse(slice, "the step of a slice is not 0");
@@ -373,7 +402,10 @@ impl<'a> Reader<'a> {
     /// A whole number of Python.
     pub fn whole_number(&mut self, expression: &Expr) -> Result<i64, Refused> {
         match self.value(expression)? {
-            Value::Number { value, is_whole: true } => Ok(value as i64),
+            Value::Number {
+                value,
+                is_whole: true,
+            } => Ok(value as i64),
             _ => refuse(expression, "a whole number is needed"),
         }
     }
@@ -402,7 +434,10 @@ impl<'a> Reader<'a> {
                 }
                 let is_whole = |item: &Value| matches!(item, Value::Number { is_whole: true, .. });
                 if array.items.borrow().iter().any(is_whole) {
-                    return refuse(values, "an array of whole numbers rounds what is assigned to it");
+                    return refuse(
+                        values,
+                        "an array of whole numbers rounds what is assigned to it",
+                    );
                 }
                 let indices: Vec<&Expr> = match index {
                     Expr::Tuple(tuple) => tuple.elts.iter().collect(),
@@ -426,7 +461,10 @@ impl<'a> Reader<'a> {
                     Value::Array(_) | Value::List(_) => {
                         let given = as_array(index, value)?;
                         if given.shape != [places.len()] {
-                            return refuse(index, "the numbers assigned are as many as their places");
+                            return refuse(
+                                index,
+                                "the numbers assigned are as many as their places",
+                            );
                         }
                         let items = given.items.borrow().clone();
                         items

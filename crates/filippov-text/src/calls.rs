@@ -31,20 +31,41 @@ impl Arguments {
         names: [&str; N],
     ) -> Result<[Option<Value>; N], Refused> {
         if self.given.len() > N {
-            return refuse(part, format!("{function} is read with {N} arguments at most"));
+            return refuse(
+                part,
+                format!("{function} is read with {N} arguments at most"),
+            );
         }
         let mut given = self.given.into_iter();
         let found = names.map(|name| given.next().or_else(|| self.named.remove(name)));
         match self.named.keys().next() {
-            Some(name) => refuse(part, format!("the keyword {name} of {function} is not read here")),
+            Some(name) => refuse(
+                part,
+                format!("the keyword {name} of {function} is not read here"),
+            ),
             None => Ok(found),
         }
     }
 }
 
 const BUILTINS: [&str; 17] = [
-    "abs", "all", "any", "enumerate", "float", "int", "len", "list", "max", "min", "pow", "range", "reversed",
-    "round", "sum", "tuple", "zip",
+    "abs",
+    "all",
+    "any",
+    "enumerate",
+    "float",
+    "int",
+    "len",
+    "list",
+    "max",
+    "min",
+    "pow",
+    "range",
+    "reversed",
+    "round",
+    "sum",
+    "tuple",
+    "zip",
 ];
 
 impl Reader<'_> {
@@ -183,11 +204,18 @@ impl Reader<'_> {
             return Ok(Value::list((0..count).map(row).collect()));
         }
         let start = arguments.named.get("start").cloned();
-        if arguments.named.keys().any(|key| name != "enumerate" || key != "start") {
+        if arguments
+            .named
+            .keys()
+            .any(|key| name != "enumerate" || key != "start")
+        {
             return refuse(call, format!("a keyword of {name} is not read here"));
         }
         let whole = |value: &Value| match value {
-            Value::Number { value, is_whole: true } => Ok(*value as i64),
+            Value::Number {
+                value,
+                is_whole: true,
+            } => Ok(*value as i64),
             _ => refuse(call, format!("{name} is read with whole numbers")),
         };
         match (name, &arguments.given[..]) {
@@ -234,13 +262,14 @@ impl Reader<'_> {
             ("float", [value @ Value::Node(_)]) => Ok(value.clone()),
             ("int", [Value::Number { value, .. }]) => Ok(Value::whole(value.trunc())),
             ("int", [value @ Value::Node(_)]) => self.function_of_one(call, "numpy.trunc", value),
-            ("round", [Value::Number { value, .. }]) => {
-                Ok(Value::whole(value.round_ties_even()))
-            }
+            ("round", [Value::Number { value, .. }]) => Ok(Value::whole(value.round_ties_even())),
             ("round", [value @ Value::Node(_)]) => self.function_of_one(call, "numpy.rint", value),
             _ => {
                 let count = arguments.given.len();
-                refuse(call, format!("{name} with {count} such arguments is not read here"))
+                refuse(
+                    call,
+                    format!("{name} with {count} such arguments is not read here"),
+                )
             }
         }
     }
@@ -275,7 +304,10 @@ impl Reader<'_> {
             return Ok(false);
         };
         if list.is_fixed.get() {
-            return refuse(call, "only a list that is made in the function can be changed");
+            return refuse(
+                call,
+                "only a list that is made in the function can be changed",
+            );
         }
         let value = self.value(value)?;
         list.items.borrow_mut().push(value);
@@ -287,7 +319,11 @@ impl Reader<'_> {
         let mut arguments = self.arguments(call)?;
         let name = part.attr.as_str();
         match (&owner, name, arguments.given.len()) {
-            (Value::Array(_), "sum" | "prod" | "mean" | "max" | "min" | "dot" | "round" | "clip", _)
+            (
+                Value::Array(_),
+                "sum" | "prod" | "mean" | "max" | "min" | "dot" | "round" | "clip",
+                _,
+            )
             | (Value::Array(_), "copy" | "tolist", 0)
             | (Value::Node(_), "clip" | "round", _) => {
                 arguments.given.insert(0, owner);
@@ -297,11 +333,12 @@ impl Reader<'_> {
                 let values = pairs.iter().rev().map(|(_, value)| value.clone());
                 Ok(Value::list(values.collect()))
             }
-            (Value::Dict(pairs), "keys", 0) => {
-                Ok(Value::list(pairs.iter().rev().map(|(key, _)| key.clone()).collect()))
-            }
+            (Value::Dict(pairs), "keys", 0) => Ok(Value::list(
+                pairs.iter().rev().map(|(key, _)| key.clone()).collect(),
+            )),
             (Value::Dict(pairs), "items", 0) => {
-                let pair = |(key, value): &(Value, Value)| Value::tuple(vec![key.clone(), value.clone()]);
+                let pair =
+                    |(key, value): &(Value, Value)| Value::tuple(vec![key.clone(), value.clone()]);
                 Ok(Value::list(pairs.iter().rev().map(pair).collect()))
             }
             _ => refuse(call, format!("the method {name} is not read here")),
@@ -341,8 +378,7 @@ impl Reader<'_> {
                 self.operation(call, Operator::Sub, &phase, &whole)
             }
             "square" => {
-                let [t, period, duty] =
-                    arguments.by_names(call, name, ["t", "period", "duty"])?;
+                let [t, period, duty] = arguments.by_names(call, name, ["t", "period", "duty"])?;
                 let (Some(t), Some(period)) = (t, period) else {
                     return refuse(call, "square needs t and a period");
                 };
@@ -404,7 +440,12 @@ impl Reader<'_> {
         Ok(found.map(|value| value.unwrap_or(Value::Nothing)))
     }
 
-    fn traced_node(&mut self, call: &ExprCall, value: &Value, what: &str) -> Result<NodeId, Refused> {
+    fn traced_node(
+        &mut self,
+        call: &ExprCall,
+        value: &Value,
+        what: &str,
+    ) -> Result<NodeId, Refused> {
         match value {
             Value::Node(node) => Ok(*node),
             _ => refuse(call, format!("{what} of a number is not read here")),
@@ -427,11 +468,19 @@ impl Reader<'_> {
         let node = self.traced_node(call, value, "a relay")?;
         let bounds = [self.node(call, low)?, self.node(call, high)?];
         self.tracer.place = call.range();
-        Ok(Value::Node(Laws::hysteresis(self.tracer, node, bounds, initial)))
+        Ok(Value::Node(Laws::hysteresis(
+            self.tracer,
+            node,
+            bounds,
+            initial,
+        )))
     }
 
     fn stick(&mut self, call: &ExprCall, speed: &Value, ratio: &Value) -> Result<Value, Refused> {
-        if ratio.number().is_some_and(|ratio| !(1.0..f64::INFINITY).contains(&ratio)) {
+        if ratio
+            .number()
+            .is_some_and(|ratio| !(1.0..f64::INFINITY).contains(&ratio))
+        {
             return refuse(call, "static: a ratio of at least 1 is needed");
         }
         let node = self.traced_node(call, speed, "static friction")?;

@@ -121,11 +121,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Hands over the items of a list, an array or a generator, each as soon as it is there.
-    pub fn for_each(
-        &mut self,
-        values: &Expr,
-        each: &mut OfEach<'_, 'a>,
-    ) -> Result<(), Refused> {
+    pub fn for_each(&mut self, values: &Expr, each: &mut OfEach<'_, 'a>) -> Result<(), Refused> {
         if let Expr::Generator(list) = values {
             return self.comprehend(&list.elt, &list.generators, each);
         }
@@ -244,8 +240,15 @@ impl<'a> Reader<'a> {
             }
             (Operator::Mult, Value::List(list), times)
             | (Operator::Mult, times, Value::List(list)) => {
-                let Value::Number { value, is_whole: true } = *times else {
-                    return refuse(part, "a list is repeated, not multiplied: write np.array([...])");
+                let Value::Number {
+                    value,
+                    is_whole: true,
+                } = *times
+                else {
+                    return refuse(
+                        part,
+                        "a list is repeated, not multiplied: write np.array([...])",
+                    );
                 };
                 let items = list.items();
                 if value * items.len() as f64 > MOST_ENTRIES as f64 {
@@ -365,9 +368,7 @@ impl<'a> Reader<'a> {
                 if matches!(other, Value::Truth(_) | Value::Condition(_)) =>
             {
                 let opposite = |value: &Value| match value {
-                    Value::Condition(condition) => {
-                        Value::Condition(Rc::new(condition.negated()))
-                    }
+                    Value::Condition(condition) => Value::Condition(Rc::new(condition.negated())),
                     Value::Truth(holds) => Value::Truth(!holds),
                     other => other.clone(),
                 };
@@ -456,7 +457,9 @@ impl<'a> Reader<'a> {
             });
         }
         if let (CmpOp::Is | CmpOp::IsNot, Value::Nothing) = (op, right) {
-            return Ok(Value::Truth(matches!(left, Value::Nothing) == (op == CmpOp::Is)));
+            return Ok(Value::Truth(
+                matches!(left, Value::Nothing) == (op == CmpOp::Is),
+            ));
         }
         let (is_greater, is_strict) = match op {
             CmpOp::Gt => (true, true),
@@ -566,7 +569,9 @@ fn power(a: f64, b: f64) -> Option<f64> {
 
 fn what_it_is(expression: &Expr) -> &'static str {
     match expression {
-        Expr::SetComp(_) | Expr::DictComp(_) => "a comprehension of a dict or a set is not read here",
+        Expr::SetComp(_) | Expr::DictComp(_) => {
+            "a comprehension of a dict or a set is not read here"
+        }
         Expr::Slice(_) => "a slice stands behind an array or a list",
         Expr::FString(_) | Expr::BytesLiteral(_) => "a text is no number",
         Expr::Starred(_) => "a star is not read here",

@@ -484,7 +484,10 @@ impl Laws {
 
     /// What is positive between the knots around an expression, and zero at them.
     fn between(tracer: &mut Tracer, node: NodeId, knots: &[f64], piece: NodeId) -> NodeId {
-        let rates: Vec<f64> = knots.windows(2).map(|pair| 1.0 / (pair[1] - pair[0])).collect();
+        let rates: Vec<f64> = knots
+            .windows(2)
+            .map(|pair| 1.0 / (pair[1] - pair[0]))
+            .collect();
         let [first, last] = match rates[..] {
             [] => [1.0, 1.0],
             [first, .., last] => [first, last],
@@ -500,7 +503,11 @@ impl Laws {
         };
         // Beyond the ends of the table one of the two distances is 1.
         let products = |rates: &[f64]| -> Vec<f64> {
-            rates.iter().zip(knots).map(|(rate, knot)| rate * knot).collect()
+            rates
+                .iter()
+                .zip(knots)
+                .map(|(rate, knot)| rate * knot)
+                .collect()
         };
         let from_below = distance(
             [&[0.0], &below[..]].concat(),
@@ -596,4 +603,3 @@ fn whole_number(end: f64) -> Option<f64> {
     let whole = end.round_ties_even();
     (end.is_finite() && (end - whole).abs() < WHOLE).then_some(whole)
 }
-

@@ -164,7 +164,10 @@ impl Reader<'_> {
         };
         let n = match n {
             None | Some(Value::Nothing) => None,
-            Some(Value::Number { value, is_whole: true }) if value >= 1.0 => Some(value as usize),
+            Some(Value::Number {
+                value,
+                is_whole: true,
+            }) if value >= 1.0 => Some(value as usize),
             _ => return refuse(part, "n: a whole number is needed"),
         };
         let parameters = match params {
@@ -301,7 +304,10 @@ pub fn traced(
         for (surface, _) in &mut watched {
             *surface = order[*surface as usize];
         }
-        rules.watched = watched.iter().map(|(surface, _)| *surface as usize).collect();
+        rules.watched = watched
+            .iter()
+            .map(|(surface, _)| *surface as usize)
+            .collect();
         Ok(Recorded {
             field,
             watched,
@@ -310,8 +316,17 @@ pub fn traced(
     };
     let new = |constants| Tracer::new(setting.names.clone(), setting.values.clone(), constants);
     let (mut tracer, recorded) = with_constants_of_motion(&new, &record)?;
-    let watched: Vec<u32> = recorded.watched.iter().map(|(surface, _)| *surface).collect();
-    check_questions(&mut tracer, &recorded.field, &watched, recorded.rules.n_hidden)?;
+    let watched: Vec<u32> = recorded
+        .watched
+        .iter()
+        .map(|(surface, _)| *surface)
+        .collect();
+    check_questions(
+        &mut tracer,
+        &recorded.field,
+        &watched,
+        recorded.rules.n_hidden,
+    )?;
     let mut is_pinned = tracer.is_pinned;
     let mut surfaces = recorded.watched.iter();
     let mut actions = Vec::new();
@@ -322,7 +337,11 @@ pub fn traced(
                 surfaces.next();
                 Trigger::Surface {
                     index: index as usize,
-                    direction: if orientation < 0.0 { -direction } else { *direction },
+                    direction: if orientation < 0.0 {
+                        -direction
+                    } else {
+                        *direction
+                    },
                     side: if orientation < 0.0 { -1 } else { 1 },
                 }
             }
@@ -365,7 +384,10 @@ fn with_constants_of_motion(
         Err(_) => {}
         Ok(recorded) => {
             let constants = Constants::of(&first.graph, &recorded.field);
-            let is_asked = first.asked.iter().any(|&node| constants.have(&first.graph, node));
+            let is_asked = first
+                .asked
+                .iter()
+                .any(|&node| constants.have(&first.graph, node));
             if !first.is_doubtful && !is_asked {
                 return Ok((first, recorded));
             }
@@ -418,9 +440,14 @@ fn parameters_of(text: &SystemText) -> Result<(Vec<String>, Vec<f64>), Refused> 
     let others = arguments.get(2 + text.args.len()..).unwrap_or_default();
     if let Some(given) = &text.parameters {
         if let Some((name, _)) = given.iter().find(|(name, _)| !others.contains(name)) {
-            return refuse(&text.place, format!("{} has no parameter {name}", function.name));
+            return refuse(
+                &text.place,
+                format!("{} has no parameter {name}", function.name),
+            );
         }
-        let others = others.iter().filter(|name| !given.iter().any(|(known, _)| known == *name));
+        let others = others
+            .iter()
+            .filter(|name| !given.iter().any(|(known, _)| known == *name));
         for name in others {
             needs_value(function, name)?;
         }

@@ -84,15 +84,18 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
                     }
                 }
             }
-            Stmt::AnnAssign(_) | Stmt::AugAssign(_) | Stmt::For(_) | Stmt::If(_) | Stmt::Pass(_) => {
-                match reader.run(std::slice::from_ref(statement))? {
-                    Flow::Next => {}
-                    _ => return refuse(statement, what_it_is(statement)),
-                }
-            }
+            Stmt::AnnAssign(_)
+            | Stmt::AugAssign(_)
+            | Stmt::For(_)
+            | Stmt::If(_)
+            | Stmt::Pass(_) => match reader.run(std::slice::from_ref(statement))? {
+                Flow::Next => {}
+                _ => return refuse(statement, what_it_is(statement)),
+            },
             Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
             other => {
-                let error = "outside of the function imports, numbers and functions with a name are read";
+                let error =
+                    "outside of the function imports, numbers and functions with a name are read";
                 return refuse(other, error);
             }
         }
@@ -119,7 +122,12 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
             }
         }
         (n, count) if n.is_none_or(|n| n == count) => (count, system.states.clone()),
-        _ => return refuse(&system.place, "n is not the number of the names of the states"),
+        _ => {
+            return refuse(
+                &system.place,
+                "n is not the number of the names of the states",
+            )
+        }
     };
     Ok(TextModel {
         name,
@@ -183,16 +191,16 @@ fn read_function(reader: &mut Reader, def: &StmtFunctionDef) -> Result<(String, 
     }
 }
 
-fn decorator_arguments(
-    reader: &mut Reader,
-    decorator: &Decorator,
-) -> Result<Arguments, Refused> {
+fn decorator_arguments(reader: &mut Reader, decorator: &Decorator) -> Result<Arguments, Refused> {
     let (function, keywords) = match &decorator.expression {
         Expr::Call(call) => (&*call.func, &call.arguments.keywords[..]),
         function => (function, &[][..]),
     };
     if reader.name_in_library(function).as_deref() != Some("filippov.system") {
-        return refuse(decorator, "a decorator other than @fl.system is not read here");
+        return refuse(
+            decorator,
+            "a decorator other than @fl.system is not read here",
+        );
     }
     let mut named = BTreeMap::new();
     for keyword in keywords {
@@ -217,16 +225,20 @@ fn chosen(
         [] => {}
         [.., (_, last)] => return refuse(&last.place, "the text has several systems"),
     }
-    let is_model = |name: &&String| {
-        matches!(scope.get(name), Some(Value::Function(function)) if function.arguments().len() >= 2)
-    };
+    let is_model = |name: &&String| matches!(scope.get(name), Some(Value::Function(function)) if function.arguments().len() >= 2);
     let named = functions.iter().find(|name| *name == MODEL);
-    match named.or_else(|| functions.iter().rev().find(is_model)).or(functions.last()) {
+    match named
+        .or_else(|| functions.iter().rev().find(is_model))
+        .or(functions.last())
+    {
         Some(name) => match scope.get(name) {
             Some(Value::Function(function)) => {
                 Ok((name.clone(), Rc::new(SystemText::of(function))))
             }
-            _ => refuse(&ruff_text_size::TextRange::default(), "a function is needed"),
+            _ => refuse(
+                &ruff_text_size::TextRange::default(),
+                "a function is needed",
+            ),
         },
         None => Err(Refused {
             error: "a function, def f(t, x, ...), is needed".into(),

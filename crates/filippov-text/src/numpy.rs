@@ -40,7 +40,10 @@ impl Reader<'_> {
             }
         }
         if let Some(keyword) = arguments.named.keys().next() {
-            return refuse(call, format!("the keyword {keyword} of {function} is not read here"));
+            return refuse(
+                call,
+                format!("the keyword {keyword} of {function} is not read here"),
+            );
         }
         match &arguments.given[..] {
             [value] if library == "numpy.linalg" && name == "norm" => {
@@ -57,7 +60,9 @@ impl Reader<'_> {
                     reader.function_of_one(call, function, item)
                 })
             }
-            [a, b] if library == "numpy" || ["hypot", "pow", "atan2", "copysign"].contains(&name) => {
+            [a, b]
+                if library == "numpy" || ["hypot", "pow", "atan2", "copysign"].contains(&name) =>
+            {
                 let is_arithmetic = operator_of(name).is_some();
                 self.refuse_hidden(call, a, is_arithmetic)?;
                 self.refuse_hidden(call, b, is_arithmetic)?;
@@ -162,7 +167,11 @@ impl Reader<'_> {
                 Value::Array(Array::new(array.shape.clone(), items, is_traced))
             }
             ("zeros" | "empty", [shape]) if is_typed => {
-                let value = if name == "zeros" { Value::float(0.0) } else { Value::Nothing };
+                let value = if name == "zeros" {
+                    Value::float(0.0)
+                } else {
+                    Value::Nothing
+                };
                 made(self.shape(call, shape)?, value)
             }
             ("ones", [shape]) if is_typed => made(self.shape(call, shape)?, Value::float(1.0)),
@@ -203,7 +212,10 @@ impl Reader<'_> {
                     _ => (bounds[0], bounds[1]),
                 };
                 if start.fract() != 0.0 || stop.fract() != 0.0 {
-                    return refuse(call, "np.arange is read with whole numbers: write np.linspace");
+                    return refuse(
+                        call,
+                        "np.arange is read with whole numbers: write np.linspace",
+                    );
                 }
                 let n = self.count(call, (stop - start).max(0.0))?;
                 let items = (0..n).map(|k| Value::whole(start + k as f64)).collect();
@@ -212,7 +224,11 @@ impl Reader<'_> {
             ("eye" | "identity", [n]) if is_typed => {
                 let n = self.shape(call, &Value::list(vec![n.clone(), n.clone()]))?[0];
                 let entry = |k: usize| Value::float(f64::from(u8::from(k / n == k % n)));
-                Value::Array(Array::new(vec![n, n], (0..n * n).map(entry).collect(), false))
+                Value::Array(Array::new(
+                    vec![n, n],
+                    (0..n * n).map(entry).collect(),
+                    false,
+                ))
             }
             ("diag", [values, rest @ ..]) if rest.len() < 2 => {
                 let offset = match rest.first().or(named("k")) {
@@ -232,9 +248,7 @@ impl Reader<'_> {
                 true => self.operation(call, Operator::Mult, a, b)?,
                 false => self.matrix_product(call, a, b)?,
             },
-            ("transpose", [value]) if is_plain => {
-                transposed(&as_array(call, value)?)
-            }
+            ("transpose", [value]) if is_plain => transposed(&as_array(call, value)?),
             ("diff", [value]) if is_plain && matches!(value, Value::Array(_)) => {
                 let items = items_of(call, value)?;
                 let mut found = Vec::new();
@@ -340,7 +354,10 @@ impl Reader<'_> {
     fn count(&self, part: &impl Ranged, n: f64) -> Result<usize, Refused> {
         match n.fract() == 0.0 && (0.0..=MOST_ENTRIES as f64).contains(&n) {
             true => Ok(n as usize),
-            false => refuse(part, "an array has a whole number of entries, and not too many"),
+            false => refuse(
+                part,
+                "an array has a whole number of entries, and not too many",
+            ),
         }
     }
 
@@ -364,13 +381,19 @@ impl Reader<'_> {
         let hidden = matches!(value, Value::List(_)) && !as_array(call, value)?.is_of_numbers();
         let is_extreme = matches!(name, "max" | "min");
         if hidden && is_extreme {
-            return refuse(call, format!("np.{name} of a list asks every comparison: write np.{name}imum(a, b)"));
+            return refuse(
+                call,
+                format!("np.{name} of a list asks every comparison: write np.{name}imum(a, b)"),
+            );
         }
         self.refuse_hidden(call, value, !is_extreme)?;
         let array = as_array(call, value)?;
         let items = array.items.borrow().clone();
         if array.is_of_numbers() && !is_extreme && items.len() > 8 {
-            return refuse(call, "a sum of many numbers: write its value, whose last digit is that of NumPy");
+            return refuse(
+                call,
+                "a sum of many numbers: write its value, whose last digit is that of NumPy",
+            );
         }
         let Some((first, others)) = items.split_first() else {
             return refuse(call, format!("np.{name} of nothing"));
@@ -385,7 +408,12 @@ impl Reader<'_> {
             };
         }
         match name {
-            "mean" => self.operation(call, Operator::Div, &total, &Value::whole(items.len() as f64)),
+            "mean" => self.operation(
+                call,
+                Operator::Div,
+                &total,
+                &Value::whole(items.len() as f64),
+            ),
             _ => Ok(total),
         }
     }
@@ -413,10 +441,11 @@ impl Reader<'_> {
         let pairs = self.by_elements(call, plus, minus, &mut |_, a, b| {
             Ok(Value::tuple(vec![a.clone(), b.clone()]))
         })?;
-        let chosen = self.by_elements(call, condition, &pairs, &mut |reader, condition, pair| {
-            let pair = items_of(call, pair)?;
-            reader.chosen(call, condition, &pair[0], &pair[1])
-        })?;
+        let chosen =
+            self.by_elements(call, condition, &pairs, &mut |reader, condition, pair| {
+                let pair = items_of(call, pair)?;
+                reader.chosen(call, condition, &pair[0], &pair[1])
+            })?;
         let Value::Array(array) = &chosen else {
             return Ok(chosen);
         };
@@ -439,7 +468,10 @@ impl Reader<'_> {
         };
         let is_truth = |value: &Value| matches!(value, Value::Truth(_) | Value::Condition(_));
         if is_truth(plus) && is_truth(minus) {
-            return refuse(call, "a choice between comparisons is not read here: write & and |");
+            return refuse(
+                call,
+                "a choice between comparisons is not read here: write & and |",
+            );
         }
         if !plus.is_scalar() || !minus.is_scalar() {
             return refuse(call, "a choice between numbers is read");
@@ -458,14 +490,20 @@ impl Reader<'_> {
         [left, right, period]: [Option<Value>; 3],
     ) -> Result<Value, Refused> {
         if period.is_some_and(|period| !matches!(period, Value::Nothing)) {
-            return refuse(call, "the period of np.interp is not read here: write t % period");
+            return refuse(
+                call,
+                "the period of np.interp is not read here: write t % period",
+            );
         }
         let (places, values) = (self.numbers(call, places)?, self.numbers(call, values)?);
         let is_table = places.len() == values.len()
             && !places.is_empty()
             && places.windows(2).all(|pair| pair[0] <= pair[1]);
         if !is_table {
-            return refuse(call, "np.interp needs places that increase, and as many values");
+            return refuse(
+                call,
+                "np.interp needs places that increase, and as many values",
+            );
         }
         let end = |given: Option<Value>, default: f64| match given {
             None | Some(Value::Nothing) => Ok(default),
@@ -550,7 +588,10 @@ impl Reader<'_> {
             };
         }
         if matches!(a, Value::Truth(_)) {
-            return refuse(call, format!("{function} of True or False is not read here"));
+            return refuse(
+                call,
+                format!("{function} of True or False is not read here"),
+            );
         }
         let node = self.node(call, a)?;
         self.tracer.place = call.range();

@@ -69,7 +69,8 @@ pub fn has_constant_part(tracer: &Tracer, pieces: &Pieces) -> bool {
 
 /// Are the signs of all parts 0 or 1?
 pub fn has_known_signs_alone(pieces: &Pieces) -> bool {
-    let is_one = |sign: &PartSign| matches!(sign, PartSign::Known(sign) if *sign == 0.0 || *sign == 1.0);
+    let is_one =
+        |sign: &PartSign| matches!(sign, PartSign::Known(sign) if *sign == 0.0 || *sign == 1.0);
     parts_of(pieces).iter().all(|(_, sign)| is_one(sign))
 }
 

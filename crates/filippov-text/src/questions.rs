@@ -19,7 +19,9 @@ pub fn check_questions(
     }
     let mut regions = tracer.regions();
     let open = vec![None; regions.graph().n_surfaces()];
-    let triggers = watched.iter().map(|&surface| regions.function(surface, &open));
+    let triggers = watched
+        .iter()
+        .map(|&surface| regions.function(surface, &open));
     let mut roots: Vec<NodeId> = triggers.collect();
     roots.splice(0..0, field.iter().copied());
     roots.extend(tracer.laws.arguments());
@@ -45,7 +47,8 @@ pub fn check_questions(
             continue;
         }
         if surface.is_none_or(|surface| regions.matters(&roots, &open, surface)) {
-            let error = "whether this is 0 in some region is not found out: it has too many signs inside";
+            let error =
+                "whether this is 0 in some region is not found out: it has too many signs inside";
             return refuse(&question.place, error);
         }
     }

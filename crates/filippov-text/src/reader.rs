@@ -116,7 +116,11 @@ impl<'a> Reader<'a> {
         let scope = Scope::inside(&function.scope);
         let mut given = given.into_iter();
         for (index, name) in names.iter().enumerate() {
-            let by_place = if index < n_by_place { given.next() } else { None };
+            let by_place = if index < n_by_place {
+                given.next()
+            } else {
+                None
+            };
             let by_name = named.remove(name);
             if by_place.is_some() && by_name.is_some() {
                 return refuse(part, format!("{} gets {name} twice", function.name));

@@ -58,7 +58,8 @@ impl Reader<'_> {
             Stmt::AugAssign(assign) => {
                 let before = self.value(&assign.target)?;
                 if matches!(before, Value::List(_) | Value::Array(_)) {
-                    let error = "a list or an array is not changed in place here: write `a = a + b`";
+                    let error =
+                        "a list or an array is not changed in place here: write `a = a + b`";
                     return refuse(assign, error);
                 }
                 let operand = self.value(&assign.value)?;
@@ -109,7 +110,12 @@ impl Reader<'_> {
             Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
             Stmt::Expr(call) => match &*call.value {
                 Expr::Call(call) if self.appends(call)? => {}
-                _ => return refuse(call, "an expression whose value is not used is not read here"),
+                _ => {
+                    return refuse(
+                        call,
+                        "an expression whose value is not used is not read here",
+                    )
+                }
             },
             other => return refuse(other, what_it_is(other)),
         }

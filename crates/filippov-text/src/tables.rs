@@ -26,13 +26,20 @@ impl Table {
     /// The table that is linear between its places, and has these values beyond them. Where two places are equal, it jumps.
     pub fn linear(places: &[f64], values: &[f64], left: f64, right: f64) -> Self {
         let n = places.len();
-        let kept: Vec<usize> = (0..n - 1).filter(|&k| places[k + 1] - places[k] > 0.0).collect();
+        let kept: Vec<usize> = (0..n - 1)
+            .filter(|&k| places[k + 1] - places[k] > 0.0)
+            .collect();
         let slope = |&k: &usize| (values[k + 1] - values[k]) / (places[k + 1] - places[k]);
         let mut knots: Vec<f64> = kept.iter().map(|&k| places[k]).collect();
         knots.push(places[n - 1]);
-        let around = |first: f64, middle: Vec<f64>, last: f64| [vec![first], middle, vec![last]].concat();
+        let around =
+            |first: f64, middle: Vec<f64>, last: f64| [vec![first], middle, vec![last]].concat();
         Table {
-            bases: around(knots[0], kept.iter().map(|&k| places[k]).collect(), places[n - 1]),
+            bases: around(
+                knots[0],
+                kept.iter().map(|&k| places[k]).collect(),
+                places[n - 1],
+            ),
             values: around(left, kept.iter().map(|&k| values[k]).collect(), right),
             slopes: around(0.0, kept.iter().map(slope).collect(), 0.0),
             knots,
@@ -74,7 +81,9 @@ impl Table {
         }
         let pieces = tracer.pieces(node, true)?;
         if let Some(pieces) = Laws::own_parts(tracer, node, pieces) {
-            return by_parts(tracer, &pieces, &mut |tracer, part, _| self.at(tracer, part));
+            return by_parts(tracer, &pieces, &mut |tracer, part, _| {
+                self.at(tracer, part)
+            });
         }
         let jumps = self.jumps();
         if jumps.len() > MOST_JUMPS {
@@ -150,7 +159,10 @@ pub fn count(
         });
     }
     // Nearest to the knot k the expression is behind k knots, or k + 1: a jump of an ordinary surface.
-    let middles: Vec<f64> = knots.windows(2).map(|pair| 0.5 * (pair[1] + pair[0])).collect();
+    let middles: Vec<f64> = knots
+        .windows(2)
+        .map(|pair| 0.5 * (pair[1] + pair[0]))
+        .collect();
     let nearest = match middles.is_empty() {
         true => tracer.graph.constant(0.0),
         false => Laws::place(tracer, node, middles),
@@ -181,9 +193,7 @@ pub fn lookup(tracer: &mut Tracer, index: NodeId, entries: &[f64]) -> Result<Nod
     };
     match tracer.pieces(index, true)? {
         None => at(tracer, index),
-        Some(pieces) => {
-            by_parts(tracer, &pieces, &mut |tracer, part, _| at(tracer, part))
-        }
+        Some(pieces) => by_parts(tracer, &pieces, &mut |tracer, part, _| at(tracer, part)),
     }
 }
 

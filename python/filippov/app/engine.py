@@ -26,7 +26,7 @@ __all__ = ["Engine"]
 
 Array = npt.NDArray[np.float64]
 
-_CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "basins", "sample")
+_CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "ends", "basins", "sample")
 _MOST_POINTS = 300
 _SAMPLES = 401  # of a cycle, for its extent: to 3e-5 of the amplitude of a sine
 _LOG = logging.getLogger(__name__)
