@@ -5,10 +5,9 @@ import { describeBasins, drawBasins, endName, type BasinsData } from "./cells.ts
 import { numberField } from "./controls.ts";
 import { button, make } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
-import { Job } from "./job.ts";
 import { motionRequest } from "./model.ts";
 import { count, showExpression } from "./numbers.ts";
-import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
+import { WorkPanel, wordsOf, type Context, type NumbersFile, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { askAll } from "./pool.ts";
 import type { Box } from "./portrait.ts";
@@ -18,9 +17,9 @@ const FIRST = 16;
 /** Rows are handed out in so many parts for each worker, so that none waits long for the others. */
 const PARTS_OF_A_WORKER = 4;
 
-export class BasinsPanel implements Panel {
+export class BasinsPanel extends WorkPanel {
   readonly element: HTMLElement;
-  private readonly picture: Picture;
+  protected readonly picture: Picture;
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly go = button("Draw", () => (this.job.isRunning ? this.job.stop() : this.begin()));
   private basins: Basins | null = null;
@@ -29,10 +28,10 @@ export class BasinsPanel implements Panel {
   private frame: Frame | null = null;
   /** What the letters of the key mean. */
   private readonly ends = make("ul", { class: "ends" });
-  private readonly job = new Job();
   private drawnFor = "";
 
   constructor(private readonly context: Context) {
+    super();
     this.box = context.window();
     this.picture = new Picture(
       "basins",
@@ -72,26 +71,11 @@ export class BasinsPanel implements Panel {
     if (this.basins === null && !this.job.isRunning) this.begin();
   }
 
-  hide(): void {}
-
   update(): void {
     if (this.drawnFor !== "" && this.drawnFor !== this.motionKey() && !this.job.isRunning) {
       this.words.textContent = "Parameters have changed since these basins were drawn.";
     }
     this.picture.redraw();
-  }
-
-  redraw(): void {
-    this.picture.redraw();
-  }
-
-  settled(): Promise<void> {
-    return this.job.settled();
-  }
-
-  close(): void {
-    this.job.stop();
-    this.picture.close();
   }
 
   saveables(): Saveable[] {

@@ -94,7 +94,7 @@ export class Front {
       theme: () => this.theme,
       ran: (run, words) => this.ran(run, words),
       axesChosen: (axes) => this.axisFields.forEach((field, k) => (field.value = String(axes[k]))),
-      planed: (words) => (this.planeWords.textContent = words === null ? "" : `The surfaces are missing: ${words}`),
+      planed: (words) => (this.planeWords.textContent = words ?? ""),
       started: () => {
         this.hint.hidden = true;
         this.showValues();

@@ -19,7 +19,7 @@ export interface MotionHooks {
   theme(): Theme;
   /** A run has come, or it failed with words; both are `null` if it was stopped. */
   ran(run: Run | null, words: string | null): void;
-  /** The plane of the portrait has come, or it failed with words. */
+  /** The plane of the portrait has come, or it failed; what is to be said of it. */
   planed(words: string | null): void;
   /** A pointer or a key has chosen another start. */
   started(): void;
@@ -243,10 +243,12 @@ export class Motion {
       const t = this.cursor ?? t_span[0];
       const request = { kind: "portrait", t, params, axes, box, rest: y0, cells: CELLS, arrows };
       this.plane = toPlane(await this.engine.ask(request, this.stopper.signal), t);
-      this.hooks.planed(null);
+      const { equilibria, searched } = this.plane;
+      this.hooks.planed(equilibria.some((point) => point.admissible) ? searched : null);
     } catch (error) {
       this.plane = null; // the trajectory stands without the plane
-      this.hooks.planed(wordsOf(error));
+      const words = wordsOf(error);
+      this.hooks.planed(words === null ? null : `The surfaces are missing: ${words}`);
     }
     this.portrait?.redraw();
   }

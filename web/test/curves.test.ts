@@ -87,6 +87,7 @@ function portraitData(): PortraitData {
         { y: [1.9, 0.7], surfaces: [], stable: true, admissible: false },
       ],
       instant: null,
+      searched: "",
     },
     axes: [0, 1],
     box: boxOf(run, [0, 1]),
