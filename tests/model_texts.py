@@ -39,7 +39,8 @@ def of_problems() -> dict[str, str]:
             continue
         known.add(problem.fun)
         module = inspect.getmodule(problem.fun)
-        assert module is not None and module.__file__ is not None
+        assert module is not None
+        assert module.__file__ is not None
         source = Path(module.__file__).read_text(encoding="utf-8")
         states = "" if problem.states is None else f", states={problem.states!r}"
         if all(isinstance(value, (int, float)) for value in problem.args):
@@ -82,9 +83,7 @@ def text_of(source: str, names: Any, last: str) -> str:
     needed |= _names_read(ast.parse(last)) if last else set()
     while True:
         more = {
-            index
-            for index, node in enumerate(tree.body)
-            if index not in kept and _names_bound(node) & needed
+            index for index, node in enumerate(tree.body) if index not in kept and _names_bound(node) & needed
         }
         if not more:
             break

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import filippov as fl
-import numpy as np
 import model_texts
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -80,11 +80,13 @@ BODIES |= {
     "loop": "s = 0.0\nfor k, c in enumerate([1.0, 2.5]):\n    s = s + c * x[k] ** (k + 1)\nreturn [x[1], -s]",
     "list grows": "rates = []\nfor c in (a, b):\n    rates.append(c * x[0] - np.sign(x[1]))\nreturn rates",
     "sum of a generator": "return [x[1], -sum(c * abs(e) for c, e in zip((1.0, 2.0), x))]",
-    "matrix": "A = np.array([[0.0, 1.0], [-2, -a * 0 - 3]])\nreturn np.array([[0, 1], [-2, 0]]) @ x - np.sign(x[1])",
+    "matrix": "return np.array([[0, 1], [-2, 0]]) @ x - np.sign(x[1])",
     "matrix of parameters": "A = np.array([[0.0, 1.0], [-a, -b]])\nreturn A @ x",
     "vectors": "b0 = np.array([1.0, -2.0])\nreturn -x + b0 * np.sign(x) - np.maximum(x, 0.5)",
     "product of vectors": "return [x[1], -np.dot(np.array([2.0, 1.0]), x) - np.sum(x * x)]",
-    "comparison of vectors": "on = x > np.array([0.5, 1.0])\nreturn np.array([2.0 * ~on[1], 1.5 * (on[0] & ~on[1])]) - x",
+    "comparison of vectors": (
+        "on = x > np.array([0.5, 1.0])\nreturn np.array([2.0 * ~on[1], 1.5 * (on[0] & ~on[1])]) - x"
+    ),
     "filled array": "dx = np.zeros(2)\ndx[0] = x[1]\ndx[1] = -np.sign(x[1]) - x[0]\nreturn dx",
     "stacked": "return np.stack([x[1], np.where(x[0] > a, -b, b)])",
     "where of vectors": "return np.where(x > 0, -x, a)",
@@ -121,7 +123,9 @@ BODIES |= {
     "table of the state": "y, v = x\nreturn v, -np.interp(y, [-1, 0, 0.5, 2], [-2, 0, 0.1, 3], left=-5)",
     "table that jumps": "y, v = x\nreturn v, -np.interp(y, [-1, 0, 0, 2], [-2, -1, 1, 3])",
     "places": "y, v = x\nreturn v, -np.array([1.0, 2.0, 4.0])[np.digitize(y, [0.0, 1.0])] * v",
-    "places that repeat": "y, v = x\nreturn v, np.array([1.0, 2.0, 4.0, 8.0])[np.digitize(t, [1.0, 1.0, 2.0])] - y",
+    "places that repeat": (
+        "y, v = x\nreturn v, np.array([1.0, 2.0, 4.0, 8.0])[np.digitize(t, [1.0, 1.0, 2.0])] - y"
+    ),
     "sorted places": "y, v = x\nreturn v, -np.searchsorted([0.0, 0.5, 2.0], y) - v",
     "angle": "y, v = x\nreturn v, -np.arctan2(v, y)",
     "copied sign": "y, v = x\nreturn v, -np.copysign(a * y, v)",
@@ -151,10 +155,18 @@ REFUSED = {
         12,
         "jumps",
     ),
-    "def f(t, x):\n    return -np.sign(np.interp(x[0], [0, 1, 2, 3], [-1, 0, 0, 1]))": (2, 13, "stands still"),
+    "def f(t, x):\n    return -np.sign(np.interp(x[0], [0, 1, 2, 3], [-1, 0, 0, 1]))": (
+        2,
+        13,
+        "stands still",
+    ),
     "def f(t, x):\n    return np.exp(2.0) - x[0]": (2, 12, "platform"),
     "def f(t, x):\n    return [i for i in range(10**9)]": (2, 24, "range"),
-    "import filippov as fl\ndef f(t, x):\n    return x\nm = fl.System(f, n=2, surfaces=[f])": (4, 5, "surfaces"),
+    "import filippov as fl\ndef f(t, x):\n    return x\nm = fl.System(f, n=2, surfaces=[f])": (
+        4,
+        5,
+        "surfaces",
+    ),
     "import filippov as fl\ndef f(t, x):\n    return [-x[0]]\n"
     "r = fl.Reset(lambda t, x: x[0], lambda t, x: [np.sign(x[0])])\nm = fl.System(f, n=1, resets=r)": (
         4,
@@ -177,7 +189,10 @@ NOT_READ = {
 
 def text_of(body: str) -> str:
     """Return a text with a function of this body."""
-    head = "import math\nimport numpy as np\nimport filippov as fl\nimport filippov.numpy as fnp\n\nGRAVITY, y0 = 9.81, [1.0, 2.0]\n\n\ndef fun(t, x, a=0.4, b=1.5):\n"
+    head = (
+        "import math\nimport numpy as np\nimport filippov as fl\nimport filippov.numpy as fnp\n\n"
+        "GRAVITY, y0 = 9.81, [1.0, 2.0]\n\n\ndef fun(t, x, a=0.4, b=1.5):\n"
+    )
     return head + textwrap.indent(body, "    ") + "\n"
 
 

@@ -198,7 +198,8 @@ class Cycle:
     def in_first_period(self) -> Cycle:
         """Return the same cycle of a forced system, begun in the first period from time 0.
 
-        A branch keeps the phase of the forcing at the start. Late in time that start moves far with the frequency.
+        A branch keeps the phase of the forcing at the start. Late in time the start moves far with the
+        frequency.
         """
         shooting, itinerary = self._shooting, self.itinerary
         start = itinerary.t0 % self.period
