@@ -63,7 +63,9 @@ def of_examples() -> dict[str, str]:
     for path in sorted((ROOT / "examples").glob("*/*.py")):
         source, folder = path.read_text(encoding="utf-8"), path.parent.name
         tree = ast.parse(source)
-        taken = {alias.name for node in tree.body if _is_of_problems(node) for alias in node.names}
+        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+        imports = [node for node in imports if str(node.module).startswith("filippov.problems.")]
+        taken = {alias.name for node in imports for alias in node.names}
         for node in tree.body:
             name = _system_name(node)
             if name is not None and not taken & _names_read(node):
@@ -100,10 +102,6 @@ def text_of(source: str, names: Any, last: str) -> str:
 
 def _is_reset(node: ast.AST) -> bool:
     return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Reset"
-
-
-def _is_of_problems(node: ast.stmt) -> Any:
-    return isinstance(node, ast.ImportFrom) and str(node.module).startswith("filippov.problems.")
 
 
 def _system_name(node: ast.stmt) -> str | None:

@@ -160,7 +160,7 @@ def test_equilibria_where_two_surfaces_meet_are_those_of_the_package(fun: Any) -
     system = fl.System(fun, n=2)
     model = pack_page(system.to_bytes(), json.dumps({"y0": [1.0, 1.0], "t_span": [0, 1]}))
     request = {"kind": "portrait", "axes": [0, 1], "box": [-3.1, 3, -3, 3.2]}
-    header = Reply.of(answer_page(model, json.dumps(request).encode())).header
+    header = Reply.of(answer_page(PageModel(model), json.dumps(request).encode())).header
     found = [point for point in header["equilibria"] if point["admissible"]]
     expected = fl.equilibria(system, [(-3.1, 3), (-3, 3.2)])
     assert any(point.codimension == 2 for point in expected)
@@ -178,7 +178,7 @@ def test_the_ends_of_basins_come_in_parts() -> None:
     window = {"axes": [0, 1], "box": [-3, 3, -3, 3], "cells": 6, "t_span": [0, 20]}
 
     def ask(**more: Any) -> Reply:
-        return Reply.of(answer_page(model, json.dumps({**window, **more}).encode()))
+        return Reply.of(answer_page(PageModel(model), json.dumps({**window, **more}).encode()))
 
     whole = ask(kind="basins")
     parts = [ask(kind="ends", rows=rows).arrays["end"] for rows in ([0, 2], [2, 5], [5, 6])]

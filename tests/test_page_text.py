@@ -150,7 +150,8 @@ REFUSED = {
     "def f(t, x):\n    y = x\n    y += 1\n    return y": (3, 5, "in place"),
     "def f(t, x):\n    return np.sign(np.array([x[0], x[1]]))": (2, 12, "np.stack"),
     "def f(t, x):\n    return np.array([x[0], x[1]]) > 0": (2, 37, "np.stack"),
-    "import filippov as fl\ndef f(t, x):\n    return fl.hysteresis(np.where(x[0] > 0, x[0] + 1, x[0]), -1, 1)": (
+    "import filippov as fl\ndef f(t, x):\n"
+    "    return fl.hysteresis(np.where(x[0] > 0, x[0] + 1, x[0]), 0, 1)": (
         3,
         12,
         "jumps",
