@@ -147,7 +147,7 @@ def _springs(t: float, x: Any) -> Any:
 
 def _relays(t: float, x: Any) -> Any:
     y, v = x
-    return [-np.sign(y - 0.5) + 2 * np.sign(v + y), 1.5 - 3 * np.sign(v + y)]
+    return [-np.sign(y - 0.5) + 2 * np.sign(v + y), 1.0 - 3 * np.sign(v + y)]
 
 
 def _saddle(t: float, x: Any) -> Any:
