@@ -211,7 +211,8 @@ export class Front {
       { class: motion.portrait ? "pictures" : "pictures single" },
       motion.portrait ? this.buildPortrait() : null,
       this.buildSeries(),
-      make("div", { class: "line" }, this.status, this.stopButton, motion.portrait ? this.hint : null, this.planeWords),
+      make("div", { class: "line" }, this.status, this.stopButton, motion.portrait ? this.hint : null),
+      this.planeWords,
     );
     root.replaceChildren(
       this.buildHeader(),
