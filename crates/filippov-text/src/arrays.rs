@@ -171,7 +171,7 @@ impl<'a> Reader<'a> {
         }
         let (a, b) = (as_array(part, a)?, as_array(part, b)?);
         let is_traced = a.is_traced || b.is_traced;
-        if !is_traced && !(a.is_of_numbers() && b.is_of_numbers()) {
+        if !(is_traced || a.is_of_numbers() && b.is_of_numbers()) {
             return refuse(part, "a product of an array that is made of traced values is not read here: write it out");
         }
         let inner = a.shape[a.shape.len() - 1];

@@ -202,7 +202,7 @@ impl Reader<'_> {
                 };
                 floats((0..n).map(value).collect())
             }
-            ("arange", [bounds @ ..]) if is_plain && (1..=2).contains(&bounds.len()) => {
+            ("arange", bounds) if is_plain && (1..=2).contains(&bounds.len()) => {
                 let bounds: Vec<f64> = bounds
                     .iter()
                     .map(|bound| self.number(call, bound))

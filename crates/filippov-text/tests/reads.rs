@@ -76,10 +76,7 @@ fn what_is_not_read_has_a_place() {
         place("def f(t, x):\n    é = 1; return x[0] << 2\n"),
         (2, 19)
     );
-    assert_eq!(
-        place("def f(t, x):\n    with x:\n        pass\n"),
-        (2, 5)
-    );
+    assert_eq!(place("def f(t, x):\n    with x:\n        pass\n"), (2, 5));
     assert_eq!(place("def f(t, x, *rest):\n    return x\n"), (1, 13));
     assert_eq!(place(""), (1, 1));
 }

@@ -137,13 +137,16 @@ fn pseudo_equilibrium(
     }))
 }
 
+/// Two surfaces, and a state near which they meet.
+type Meeting = (Vec<usize>, Vec<f64>);
+
 /// Where two surfaces meet in the window, as far as the ends of their pieces show it; in more than two states also starts along
 /// each surface, for the other states are not those of the window there.
 fn meetings(
     plane: &Plane,
     parts: &[SheetPart],
     n_visible: usize,
-) -> Result<Vec<(Vec<usize>, Vec<f64>)>, FieldError> {
+) -> Result<Vec<Meeting>, FieldError> {
     let mut found = Vec::new();
     for part in parts {
         let stride = part.points.len().div_ceil(STARTS_ALONG);
