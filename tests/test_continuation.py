@@ -69,6 +69,15 @@ def test_branch_of_the_dry_friction_oscillator(dry: fl.Branch) -> None:
     assert np.max(data.residual.values) < 1e-9
 
 
+def test_a_branch_does_not_depend_on_the_period_in_which_its_cycle_was_found() -> None:
+    early, late = (
+        fl.continuation(fl.limit_cycle(friction(), [1.0, 2.0], {"omega": 2.0}, t0=t0), "omega", (1.8, 2.2))
+        for t0 in (0.0, 60 * np.pi)
+    )
+    assert len(late) == len(early)
+    assert np.allclose(late.data.period, early.data.period, rtol=1e-9)
+
+
 def test_points_of_the_branch_are_attractors(dry: fl.Branch) -> None:
     system = friction()
     for omega in (0.17, 0.3, 0.45, 0.7, 0.9):

@@ -138,3 +138,54 @@ def test_some_problems_are_arithmetic_and_some_are_not() -> None:
     arithmetic = {name for name in NAMES if is_arithmetic(name)}
     assert {"biased_relay", "friction_chain", "relay_feedback"} <= arithmetic
     assert not {"dry_friction", "drill_string", "rubbing_blocks"} & arithmetic
+
+
+def _springs(t: float, x: Any) -> Any:
+    y, v = x
+    return [v - np.sign(y), -y - np.sign(v) + 0.2]
+
+
+def _relays(t: float, x: Any) -> Any:
+    y, v = x
+    return [-np.sign(y - 0.5) + 2 * np.sign(v + y), 1.0 - 3 * np.sign(v + y)]
+
+
+def _saddle(t: float, x: Any) -> Any:
+    y, v = x
+    return [np.sign(y) - 0.5 * np.sign(v), -np.sign(v) + 0.3 * y]
+
+
+@pytest.mark.parametrize("fun", [_springs, _relays, _saddle])
+def test_equilibria_where_two_surfaces_meet_are_those_of_the_package(fun: Any) -> None:
+    system = fl.System(fun, n=2)
+    model = pack_page(system.to_bytes(), json.dumps({"y0": [1.0, 1.0], "t_span": [0, 1]}))
+    request = {"kind": "portrait", "axes": [0, 1], "box": [-3.1, 3, -3, 3.2]}
+    header = Reply.of(answer_page(PageModel(model), json.dumps(request).encode())).header
+    found = [point for point in header["equilibria"] if point["admissible"]]
+    expected = fl.equilibria(system, [(-3.1, 3), (-3, 3.2)])
+    assert any(point.codimension == 2 for point in expected)
+    assert len(found) == len(expected)
+    assert "two surfaces meet" in header["searched"]
+    for point in expected:
+        [same] = [other for other in found if np.allclose(other["y"], point.y, atol=1e-8)]
+        names = [name for name, entry in zip(system.surfaces, point.mode, strict=True) if entry == 0]
+        assert sorted(same["surfaces"]) == sorted(names)
+        assert same["stable"] in (None, point.is_stable)
+
+
+def test_the_ends_of_basins_come_in_parts() -> None:
+    model = model_bytes("dieci_lopez_6_1")
+    window = {"axes": [0, 1], "box": [-3, 3, -3, 3], "cells": 6, "t_span": [0, 20]}
+
+    def ask(**more: Any) -> Reply:
+        return Reply.of(answer_page(PageModel(model), json.dumps({**window, **more}).encode()))
+
+    whole = ask(kind="basins")
+    parts = [ask(kind="ends", rows=rows).arrays["end"] for rows in ([0, 2], [2, 5], [5, 6])]
+    ends = [value if np.isfinite(value) else None for value in np.concatenate(parts).ravel().tolist()]
+    grouped = ask(kind="basins", ends=ends)
+    assert np.array_equal(grouped.arrays["label"], whole.arrays["label"])
+    assert grouped.header["labels"] == whole.header["labels"]
+    for rows in ([2, 2], [0, 7], [0.5, 1]):
+        assert not ask(kind="ends", rows=rows).header["ok"]
+    assert not ask(kind="basins", ends=ends[:-1]).header["ok"]

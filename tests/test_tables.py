@@ -243,3 +243,9 @@ def test_random_tables_are_nested_choices(seed: int) -> None:
         assert sol.success, sol.message
         ends.append(sol.y[:, -1])
     assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+
+
+def test_a_list_at_places_among_bins_that_repeat() -> None:
+    values = np.array([10.0, 20.0, 30.0, 40.0])
+    system = fl.System(lambda t, x: [values[np.digitize(t, [1.0, 1.0, 2.0])]], n=1)
+    assert system.solve((0.0, 3.0), [0.0]).y[0, -1] == pytest.approx(10.0 + 30.0 + 40.0, abs=1e-9)

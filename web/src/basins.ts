@@ -5,19 +5,21 @@ import { describeBasins, drawBasins, endName, type BasinsData } from "./cells.ts
 import { numberField } from "./controls.ts";
 import { button, make } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
-import { Job } from "./job.ts";
 import { motionRequest } from "./model.ts";
 import { count, showExpression } from "./numbers.ts";
-import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
+import { WorkPanel, wordsOf, type Context, type NumbersFile, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
+import { askAll } from "./pool.ts";
 import type { Box } from "./portrait.ts";
 import { toBasins, type Basins } from "./replies.ts";
 
 const FIRST = 16;
+/** Rows are handed out in so many parts for each worker, so that none waits long for the others. */
+const PARTS_OF_A_WORKER = 4;
 
-export class BasinsPanel implements Panel {
+export class BasinsPanel extends WorkPanel {
   readonly element: HTMLElement;
-  private readonly picture: Picture;
+  protected readonly picture: Picture;
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly go = button("Draw", () => (this.job.isRunning ? this.job.stop() : this.begin()));
   private basins: Basins | null = null;
@@ -26,10 +28,10 @@ export class BasinsPanel implements Panel {
   private frame: Frame | null = null;
   /** What the letters of the key mean. */
   private readonly ends = make("ul", { class: "ends" });
-  private readonly job = new Job();
   private drawnFor = "";
 
   constructor(private readonly context: Context) {
+    super();
     this.box = context.window();
     this.picture = new Picture(
       "basins",
@@ -69,26 +71,11 @@ export class BasinsPanel implements Panel {
     if (this.basins === null && !this.job.isRunning) this.begin();
   }
 
-  hide(): void {}
-
   update(): void {
     if (this.drawnFor !== "" && this.drawnFor !== this.motionKey() && !this.job.isRunning) {
       this.words.textContent = "Parameters have changed since these basins were drawn.";
     }
     this.picture.redraw();
-  }
-
-  redraw(): void {
-    this.picture.redraw();
-  }
-
-  settled(): Promise<void> {
-    return this.job.settled();
-  }
-
-  close(): void {
-    this.job.stop();
-    this.picture.close();
   }
 
   saveables(): Saveable[] {
@@ -126,7 +113,7 @@ export class BasinsPanel implements Panel {
   }
 
   private async compute(signal: AbortSignal): Promise<void> {
-    const { state, engines } = this.context;
+    const { state } = this.context;
     if (state.axes === null) {
       this.picture.say("Basins need a plane: this model has one state.");
       return;
@@ -141,8 +128,8 @@ export class BasinsPanel implements Panel {
       for (let cells = FIRST; ; cells *= 2) {
         const size = Math.min(cells, this.cells);
         const { x, y } = this.box;
-        const request = { kind: "basins", ...motionRequest(state), axes: state.axes, box: [...x, ...y], cells: size };
-        const found = toBasins(await engines.many()[0].ask(request, signal));
+        const window = { ...motionRequest(state), axes: state.axes, box: [...x, ...y], cells: size };
+        const found = await this.shared(window, size, signal);
         signal.throwIfAborted();
         this.basins = found;
         this.ends.replaceChildren(
@@ -160,6 +147,27 @@ export class BasinsPanel implements Panel {
       this.go.textContent = "Draw again";
       this.picture.redraw();
     }
+  }
+
+  /** The ends of the rows come from all workers; one of them groups them. */
+  private async shared(window: Record<string, unknown>, size: number, signal: AbortSignal): Promise<Basins> {
+    const engines = this.context.engines.many();
+    if (engines.length === 1) return toBasins(await engines[0].ask({ kind: "basins", ...window }, signal));
+    const height = Math.ceil(size / (PARTS_OF_A_WORKER * engines.length));
+    const rows = Array.from({ length: Math.ceil(size / height) }, (_, k) => [k * height, Math.min((k + 1) * height, size)]);
+    let ends: Float64Array | null = null;
+    await askAll(
+      engines,
+      rows.map((part) => ({ kind: "ends", ...window, rows: part })),
+      (reply, request) => {
+        const { data, shape } = reply.table("end");
+        ends ??= new Float64Array(size * size * shape[1]);
+        ends.set(data, (request.rows as number[])[0] * size * shape[1]);
+      },
+      signal,
+    );
+    // what is no number becomes null on its way
+    return toBasins(await engines[0].ask({ kind: "basins", ...window, ends: [...(ends ?? [])] }, signal));
   }
 
   private data(): BasinsData {

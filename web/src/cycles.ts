@@ -4,18 +4,17 @@ import { describeBranch, drawBranch, type BranchData } from "./branch.ts";
 import { labelled } from "./controls.ts";
 import { button, make, select } from "./dom.ts";
 import { pointsCsv } from "./export.ts";
-import { Job } from "./job.ts";
 import { motionRequest, rangeOf } from "./model.ts";
 import { showName, showNumber } from "./numbers.ts";
-import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
+import { WorkPanel, wordsOf, type Context, type NumbersFile, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { engineFor } from "./pool.ts";
 import { coordinateField, fieldsForm, parameterField, rangeFields } from "./sections.ts";
 import { toBranch, toCycle, type Branch } from "./replies.ts";
 
-export class CyclesPanel implements Panel {
+export class CyclesPanel extends WorkPanel {
   readonly element: HTMLElement;
-  private readonly picture: Picture;
+  protected readonly picture: Picture;
   private readonly findForm = fieldsForm();
   private readonly followForm = fieldsForm();
   private readonly canFollow: boolean;
@@ -27,7 +26,6 @@ export class CyclesPanel implements Panel {
     this.press(this.go, (signal) => this.find(signal)),
   );
   private readonly follow = button("Follow", () => this.press(this.follow, (signal) => this.continue(signal)));
-  private readonly job = new Job();
   private branch: Branch | null = null;
   private of: "cycle" | "equilibrium" = "cycle";
   private foundFor = "";
@@ -35,6 +33,7 @@ export class CyclesPanel implements Panel {
   private start: { readonly t0: number; readonly y0: number[] } | null = null;
 
   constructor(private readonly context: Context) {
+    super();
     const { model } = context;
     this.picture = new Picture(
       "branch",
@@ -80,8 +79,6 @@ export class CyclesPanel implements Panel {
     );
   }
 
-  hide(): void {}
-
   update(): void {
     if (this.foundFor !== "" && this.foundFor !== this.motionKey()) {
       this.foundFor = "";
@@ -91,19 +88,6 @@ export class CyclesPanel implements Panel {
       this.multipliers.textContent = "";
     }
     this.picture.redraw();
-  }
-
-  redraw(): void {
-    this.picture.redraw();
-  }
-
-  settled(): Promise<void> {
-    return this.job.settled();
-  }
-
-  close(): void {
-    this.job.stop();
-    this.picture.close();
   }
 
   saveables(): Saveable[] {

@@ -7,10 +7,9 @@ import { Points } from "./counts.ts";
 import { button, make } from "./dom.ts";
 import type { Request } from "./engine.ts";
 import { pointsCsv } from "./export.ts";
-import { Job } from "./job.ts";
 import { hasReciprocal, longSpan, motionRequest, rangeOf, reciprocalRange, sweptSection } from "./model.ts";
 import { count, showName, showNumber } from "./numbers.ts";
-import { wordsOf, type Context, type NumbersFile, type Panel, type Saveable } from "./panel.ts";
+import { WorkPanel, wordsOf, type Context, type NumbersFile, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
 import { askAll } from "./pool.ts";
 import { toDiagramPart } from "./replies.ts";
@@ -35,9 +34,9 @@ interface Window {
   readonly up: Interval | null;
 }
 
-export class DiagramPanel implements Panel {
+export class DiagramPanel extends WorkPanel {
   readonly element: HTMLElement;
-  private readonly picture: Picture;
+  protected readonly picture: Picture;
   private readonly form = fieldsForm();
   private readonly words = make("p", { class: "quiet", role: "status" });
   private readonly go = button("Draw", () => (this.job.isRunning ? this.job.stop() : this.begin()));
@@ -49,7 +48,6 @@ export class DiagramPanel implements Panel {
   private up: Interval | null = null;
   private frame: Frame | null = null;
   private choice: CloudData["choice"] = null;
-  private readonly job = new Job();
   private drawnFor = "";
   private done = 0;
   /** The number of values: one for each column of pixels. */
@@ -57,6 +55,7 @@ export class DiagramPanel implements Panel {
   private failed = new Map<number, string>();
 
   constructor(private readonly context: Context) {
+    super();
     this.picture = new Picture(
       "diagram",
       (pen, w, h, theme) => void (this.frame = drawCloud(pen, w, h, this.data(), theme)),
@@ -82,26 +81,11 @@ export class DiagramPanel implements Panel {
     if (this.points.length === 0 && !this.job.isRunning) this.begin();
   }
 
-  hide(): void {}
-
   update(): void {
     if (this.drawnFor !== "" && this.drawnFor !== this.motionKey() && !this.job.isRunning) {
       this.words.textContent = "The other parameters have changed since this diagram was drawn.";
     }
     this.picture.redraw(); // the line at the parameter's value
-  }
-
-  redraw(): void {
-    this.picture.redraw();
-  }
-
-  settled(): Promise<void> {
-    return this.job.settled();
-  }
-
-  close(): void {
-    this.job.stop();
-    this.picture.close();
   }
 
   saveables(): Saveable[] {

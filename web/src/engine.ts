@@ -19,6 +19,7 @@ export const WASM_KINDS: ReadonlySet<string> = new Set([
   "section",
   "diagram",
   "portrait",
+  "ends",
   "basins",
   "sample",
 ]);

@@ -94,7 +94,7 @@ export class Front {
       theme: () => this.theme,
       ran: (run, words) => this.ran(run, words),
       axesChosen: (axes) => this.axisFields.forEach((field, k) => (field.value = String(axes[k]))),
-      planed: (words) => (this.planeWords.textContent = words === null ? "" : `The surfaces are missing: ${words}`),
+      planed: (words) => (this.planeWords.textContent = words ?? ""),
       started: () => {
         this.hint.hidden = true;
         this.showValues();
@@ -211,7 +211,8 @@ export class Front {
       { class: motion.portrait ? "pictures" : "pictures single" },
       motion.portrait ? this.buildPortrait() : null,
       this.buildSeries(),
-      make("div", { class: "line" }, this.status, this.stopButton, motion.portrait ? this.hint : null, this.planeWords),
+      make("div", { class: "line" }, this.status, this.stopButton, motion.portrait ? this.hint : null),
+      this.planeWords,
     );
     root.replaceChildren(
       this.buildHeader(),

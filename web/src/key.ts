@@ -1,6 +1,6 @@
 /** The key below a picture: samples of what is drawn, with names. */
 
-import { explainMode, isSliding, modeColour } from "./modes.ts";
+import { explainMode, isSliding, type ModeNumbers } from "./modes.ts";
 import { count } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import { SLIDING_WIDTH, SMOOTH_WIDTH, type Theme } from "./theme.ts";
@@ -97,10 +97,15 @@ export function wordsEntry(label: string): KeyEntry {
 const MOST_MODES_NAMED = 8;
 
 /** The modes of a run, not more of them than a reader takes in. */
-export function modeEntries(modes: readonly string[], surfaces: readonly string[], theme: Theme): KeyEntry[] {
+export function modeEntries(
+  modes: readonly string[],
+  numbers: ModeNumbers,
+  surfaces: readonly string[],
+  theme: Theme,
+): KeyEntry[] {
   const entries = modes
     .slice(0, MOST_MODES_NAMED)
-    .map((mode) => modeEntry(explainMode(mode, surfaces), modeColour(mode, theme.colours), isSliding(mode)));
+    .map((mode) => modeEntry(explainMode(mode, surfaces), numbers.colour(mode, theme), isSliding(mode)));
   const left = modes.length - MOST_MODES_NAMED;
   return left > 0 ? [...entries, wordsEntry(`and ${count(left, "more mode")}`)] : entries;
 }

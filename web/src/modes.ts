@@ -1,6 +1,11 @@
-/** Modes as sign vectors, `+0-`: their order, their names, and their colours, which are the same in every run. */
+/** Modes as sign vectors, `+0-`: their order, their names, and their colours. */
 
 import { showExpression } from "./numbers.ts";
+import type { Theme } from "./theme.ts";
+
+/** With so many surfaces every mode has its place among all, and so many modes there are then. */
+const MOST_SURFACES_OF_ALL = 2;
+const ALL_MODES = 9;
 
 /** Rows of Pascal's triangle modulo `modulus`. */
 function binomials(n: number, modulus: number): number[][] {
@@ -14,11 +19,10 @@ function binomials(n: number, modulus: number): number[][] {
 }
 
 /**
- * The place of a mode among all modes of as many surfaces, modulo the number of colours.
+ * The place of a mode among all modes of as many surfaces, modulo a number.
  *
  * Regions come first, then sliding on one surface, on two, ..; within these `+` comes before `0` and `-`, as in the
- * figures of the Python package. Modulo the seven colours two regions with a common surface never agree, for 7
- * divides no power of two.
+ * figures of the Python package.
  */
 export function modeRank(mode: string, modulus: number): number {
   const m = mode.length;
@@ -44,8 +48,44 @@ export function modeRank(mode: string, modulus: number): number {
   return rank % modulus;
 }
 
-export function modeColour(mode: string, colours: readonly string[]): string {
-  return colours[modeRank(mode, colours.length)];
+/** How far colours after the seventh are mixed with the ink, and those after the fourteenth with the ground. */
+const SHADES = [0, 0.45, 0.5];
+
+/**
+ * The numbers of modes: no two modes in one picture share a colour, and a mode keeps its own while the page is open.
+ *
+ * With one surface or two a mode has its place among all modes, so that its colour is the same in every picture. With more
+ * surfaces there are too many: the modes of the first run are numbered in their order, and others as they come.
+ */
+export class ModeNumbers {
+  private readonly numbers = new Map<string, number>();
+
+  /** Number the modes of a run. */
+  note(modes: Iterable<string>): void {
+    for (const mode of sortModes(modes)) {
+      if (this.numbers.has(mode)) continue;
+      const number = mode.length <= MOST_SURFACES_OF_ALL ? modeRank(mode, ALL_MODES) : this.numbers.size;
+      this.numbers.set(mode, number);
+    }
+  }
+
+  /** The colour of a mode; the faint ink if there are no more. */
+  colour(mode: string, theme: Theme): string {
+    this.note([mode]);
+    const number = this.numbers.get(mode)!;
+    const level = Math.floor(number / theme.colours.length);
+    if (level >= SHADES.length) return theme.faint;
+    const own = theme.colours[number % theme.colours.length];
+    return level === 0 ? own : mix(own, level === 2 ? theme.ground : theme.ink, SHADES[level]);
+  }
+}
+
+/** Two colours `#rrggbb`, mixed. */
+function mix(a: string, b: string, share: number): string {
+  const parts = (colour: string) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+  const [from, to] = [parts(a), parts(b)];
+  const mixed = from.map((value, k) => Math.round((1 - share) * value + share * to[k]));
+  return `#${mixed.map((value) => value.toString(16).padStart(2, "0")).join("")}`;
 }
 
 export function isSliding(mode: string): boolean {

@@ -1,11 +1,11 @@
 /** The motion on the screen: one run, its phase portrait and its time series, and what a pointer does to them. */
 
 import type { Frame, Interval } from "./axes.ts";
-import { boundsOf, stateAt } from "./curves.ts";
+import { boundsOf, modesOf, stateAt } from "./curves.ts";
 import type { Engine } from "./engine.ts";
 import { Latest } from "./latest.ts";
 import { motionRequest, type Description, type State } from "./model.ts";
-import { showMode } from "./modes.ts";
+import { ModeNumbers, showMode } from "./modes.ts";
 import { showName, showNumber } from "./numbers.ts";
 import { wordsOf, type Saveable } from "./panel.ts";
 import { Picture } from "./picture.ts";
@@ -19,7 +19,7 @@ export interface MotionHooks {
   theme(): Theme;
   /** A run has come, or it failed with words; both are `null` if it was stopped. */
   ran(run: Run | null, words: string | null): void;
-  /** The plane of the portrait has come, or it failed with words. */
+  /** The plane of the portrait has come, or it failed; what is to be said of it. */
   planed(words: string | null): void;
   /** A pointer or a key has chosen another start. */
   started(): void;
@@ -55,6 +55,7 @@ export class Motion {
   private time: Frame["x"] | null = null;
   private shown: number[];
   private stopper = new AbortController();
+  private readonly modes = new ModeNumbers();
   private readonly latest = new Latest<Fitted>((fitted) => this.compute(fitted));
   private readonly latestPlane = new Latest<null>(() => this.computePlane());
 
@@ -209,6 +210,7 @@ export class Motion {
       for (const y0 of this.state.kept)
         kept.push(toRun(await this.engine.ask({ kind: "run", ...motionRequest(this.state), y0 }, signal)));
       this.run = run;
+      this.modes.note(modesOf(run));
       this.kept = kept;
       if (run.t.length === 0) throw new Error(run.message || "The run has no points.");
       if (this.cursor !== null && stateAt(run, this.cursor) === null) this.cursor = null;
@@ -241,10 +243,12 @@ export class Motion {
       const t = this.cursor ?? t_span[0];
       const request = { kind: "portrait", t, params, axes, box, rest: y0, cells: CELLS, arrows };
       this.plane = toPlane(await this.engine.ask(request, this.stopper.signal), t);
-      this.hooks.planed(null);
+      const { equilibria, searched } = this.plane;
+      this.hooks.planed(equilibria.some((point) => point.admissible) ? searched : null);
     } catch (error) {
       this.plane = null; // the trajectory stands without the plane
-      this.hooks.planed(wordsOf(error));
+      const words = wordsOf(error);
+      this.hooks.planed(words === null ? null : `The surfaces are missing: ${words}`);
     }
     this.portrait?.redraw();
   }
@@ -296,6 +300,7 @@ export class Motion {
       box: this.window(),
       states: model.states,
       surfaces: model.surfaces,
+      modes: this.modes,
       start: this.state.y0,
       marked: at?.y ?? null,
       withModes,
@@ -310,6 +315,7 @@ export class Motion {
       run,
       states: model.states,
       surfaces: model.surfaces,
+      modes: this.modes,
       shown: this.shown,
       window: this.zoomed ?? [from, to],
       spans: this.spans,

@@ -2,7 +2,9 @@
 
 import type { Engines } from "./pool.ts";
 import type { Drawing } from "./export.ts";
+import { Job } from "./job.ts";
 import type { Description, State } from "./model.ts";
+import type { Picture } from "./picture.ts";
 import type { Run } from "./replies.ts";
 import type { Theme } from "./theme.ts";
 
@@ -50,6 +52,33 @@ export interface Panel {
   /** Resolves when nothing is being computed. */
   settled(): Promise<void>;
   close(): void;
+}
+
+/** A place with one picture of work that can be stopped. */
+export abstract class WorkPanel implements Panel {
+  abstract readonly element: HTMLElement;
+  protected abstract readonly picture: Picture;
+  protected readonly job = new Job();
+
+  abstract show(): void;
+  abstract update(): void;
+  abstract saveables(): Saveable[];
+  abstract numbers(): NumbersFile[];
+
+  hide(): void {}
+
+  redraw(): void {
+    this.picture.redraw();
+  }
+
+  settled(): Promise<void> {
+    return this.job.settled();
+  }
+
+  close(): void {
+    this.job.stop();
+    this.picture.close();
+  }
 }
 
 /** The words of a failure; `null` if it was stopped on purpose. */

@@ -3,7 +3,7 @@
 import { clipTo, drawAxes, frameIn, padded, type Frame, type Interval } from "./axes.ts";
 import { boundsOf, coordinate, dwellRadius, findDwells, findJumps, modesOf, tracePiece } from "./curves.ts";
 import { dotEntry, drawKey, layKey, lineEntry, modeEntries, SAMPLE, type KeyEntry } from "./key.ts";
-import { isSliding, modeColour } from "./modes.ts";
+import { isSliding, type ModeNumbers } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import type { Equilibrium, Plane, Run, SurfaceKind } from "./replies.ts";
@@ -23,6 +23,7 @@ export interface PortraitData {
   readonly box: Box;
   readonly states: readonly string[];
   readonly surfaces: readonly string[];
+  readonly modes: ModeNumbers;
   readonly start: readonly number[];
   /** The state under the pointer of the time series. */
   readonly marked: readonly number[] | null;
@@ -54,9 +55,9 @@ export function drawPortrait(pen: Pen, width: number, height: number, data: Port
     drawSurfaces(pen, data.plane, frame, theme);
   }
   pen.globalAlpha = 0.4;
-  for (const run of data.kept) drawRun(pen, run, data.axes, frame, theme);
+  for (const run of data.kept) drawRun(pen, run, data, frame, theme);
   pen.globalAlpha = 1;
-  if (data.run) drawRun(pen, data.run, data.axes, frame, theme);
+  if (data.run) drawRun(pen, data.run, data, frame, theme);
   if (data.cycle) drawCycle(pen, data.cycle, data.axes, frame, theme);
   for (const point of data.plane?.equilibria ?? []) drawEquilibrium(pen, point, data.axes, frame, theme);
   drawStart(pen, data, frame, theme);
@@ -82,14 +83,14 @@ export function fits(run: Run, axes: readonly [number, number], box: Box): boole
   });
 }
 
-function drawRun(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: Frame, theme: Theme): void {
+function drawRun(pen: Pen, run: Run, { axes: [i, j], modes }: PortraitData, frame: Frame, theme: Theme): void {
   const whole = Math.abs(run.t[run.t.length - 1] - run.t[0]);
   pen.setLineDash([]);
   // sliding lies on the rest, for it is what the eye should find
   for (const slides of [false, true]) {
     for (const mode of modesOf(run)) {
       if (isSliding(mode) !== slides) continue;
-      pen.strokeStyle = modeColour(mode, theme.colours);
+      pen.strokeStyle = modes.colour(mode, theme);
       pen.lineWidth = slides ? SLIDING_WIDTH : SMOOTH_WIDTH;
       pen.beginPath();
       for (const piece of run.pieces) if (piece.mode === mode) tracePiece(pen, run, piece, i, j, frame);
@@ -108,7 +109,7 @@ function drawRun(pen: Pen, run: Run, [i, j]: readonly [number, number], frame: F
   pen.setLineDash([]);
   for (const dwell of findDwells(run, i, j, frame)) {
     circle(pen, dwell.x, dwell.y, dwellRadius(dwell.duration, whole));
-    pen.fillStyle = modeColour(dwell.mode, theme.colours);
+    pen.fillStyle = modes.colour(dwell.mode, theme);
     pen.fill();
     pen.strokeStyle = theme.ground;
     pen.lineWidth = 1.2;
@@ -253,7 +254,7 @@ function drawMark(pen: Pen, x: number, y: number, theme: Theme): void {
 function keyEntries(data: PortraitData, frame: Frame, theme: Theme): KeyEntry[] {
   const entries: KeyEntry[] = [];
   const { plane, run } = data;
-  if (data.withModes && run) entries.push(...modeEntries(modesOf(run), data.surfaces, theme));
+  if (data.withModes && run) entries.push(...modeEntries(modesOf(run), data.modes, data.surfaces, theme));
   const kinds = new Set(plane?.parts.map((part) => part.kind));
   for (const [kind, line] of Object.entries(SURFACE_LINES) as [SurfaceKind, SurfaceLine][]) {
     if (kinds.has(kind)) entries.push(lineEntry(line.label, line.colour(theme), line.width, line.dash));

@@ -66,6 +66,8 @@ export interface Plane {
   readonly equilibria: readonly Equilibrium[];
   /** The time of the field, if the field depends on it; such a plane has no equilibria. */
   readonly instant: number | null;
+  /** How equilibria were looked for, in words. */
+  readonly searched: string;
 }
 
 /** Returns to a section: `y` holds rows of `n` states. */
@@ -145,6 +147,7 @@ export function toPlane(reply: Reply, t: number): Plane {
     points: reply.table("points").data,
     field: reply.table("field").data,
     equilibria: (header.equilibria ?? []) as Equilibrium[],
+    searched: String(header.searched ?? ""),
     instant: header.note ? t : null, // the note says that the field depends on the time
   };
 }

@@ -3,7 +3,7 @@
 import { clipTo, crisp, drawAxes, linear, padded, ticksOf, type Frame, type Interval } from "./axes.ts";
 import { boundsOf, findJumps, modesOf, TIME, tracePiece } from "./curves.ts";
 import { drawKey, layKey, modeEntries } from "./key.ts";
-import { isSliding } from "./modes.ts";
+import { isSliding, type ModeNumbers } from "./modes.ts";
 import { count, showNumber } from "./numbers.ts";
 import { circle, setFont, type Pen } from "./pen.ts";
 import type { Run } from "./replies.ts";
@@ -14,6 +14,7 @@ export interface SeriesData {
   readonly run: Run | null;
   readonly states: readonly string[];
   readonly surfaces: readonly string[];
+  readonly modes: ModeNumbers;
   /** The states that have a panel. */
   readonly shown: readonly number[];
   /** The part of time that is shown. */
@@ -35,7 +36,7 @@ export function drawSeries(pen: Pen, width: number, height: number, data: Series
   const { run, shown } = data;
   const time = linear(data.window, [LEFT, Math.max(LEFT + 10, width - RIGHT)]);
   if (!run) return time;
-  const entries = modeEntries(modesOf(run), data.surfaces, theme);
+  const entries = modeEntries(modesOf(run), data.modes, data.surfaces, theme);
   const key = layKey(pen, entries, width - LEFT - RIGHT);
   const floor = height - key.height - BELOW_STRIP - STRIP_HEIGHT - ABOVE_STRIP;
   const each = (floor - 4) / shown.length;
@@ -45,7 +46,7 @@ export function drawSeries(pen: Pen, width: number, height: number, data: Series
     drawPanel(pen, run, state, frame, data, theme);
   });
   const top = height - key.height - BELOW_STRIP - STRIP_HEIGHT;
-  drawStrip(pen, run, time, top, theme);
+  drawStrip(pen, run, data.modes, time, top, theme);
   drawTime(pen, time, top + STRIP_HEIGHT + 6, theme);
   if (data.cursor) drawCursor(pen, time.at(data.cursor.t), 12, top + STRIP_HEIGHT, theme);
   drawKey(pen, entries, LEFT, height - key.height - 2, width - LEFT - RIGHT, theme);

@@ -1,7 +1,7 @@
 /** The strip of modes below the time series: which mode, from when to when. */
 
 import type { Scale } from "./axes.ts";
-import { isSliding, modeColour, showMode } from "./modes.ts";
+import { isSliding, showMode, type ModeNumbers } from "./modes.ts";
 import { setFont, type Pen } from "./pen.ts";
 import type { Run } from "./replies.ts";
 import type { Theme } from "./theme.ts";
@@ -11,7 +11,7 @@ const REGION_HEIGHT = 7;
 const NARROWEST_NAMED = 16;
 
 /** Regions are narrow bands and sliding fills the strip, so that the two differ without colour too. */
-export function drawStrip(pen: Pen, run: Run, time: Scale, top: number, theme: Theme): void {
+export function drawStrip(pen: Pen, run: Run, numbers: ModeNumbers, time: Scale, top: number, theme: Theme): void {
   const [left, right] = time.places;
   pen.save();
   pen.beginPath();
@@ -22,7 +22,7 @@ export function drawStrip(pen: Pen, run: Run, time: Scale, top: number, theme: T
     if (to < left || from > right) continue;
     const slides = isSliding(piece.mode);
     const height = slides ? STRIP_HEIGHT : REGION_HEIGHT;
-    pen.fillStyle = modeColour(piece.mode, theme.colours);
+    pen.fillStyle = numbers.colour(piece.mode, theme);
     pen.fillRect(from, top + 0.5 * (STRIP_HEIGHT - height), Math.max(to - from - 0.75, 0.5), height);
   }
   nameModes(pen, run, time, top, theme);

@@ -4,6 +4,7 @@ import { describeBranch, drawBranch } from "../src/branch.ts";
 import type { Branch } from "../src/replies.ts";
 import { frameIn } from "../src/axes.ts";
 import { boundsOf, dwellRadius, findDwells, findJumps, stateAt } from "../src/curves.ts";
+import { ModeNumbers } from "../src/modes.ts";
 import { boxOf, describePortrait, drawPortrait, fits, type PortraitData } from "../src/portrait.ts";
 import { SvgPen } from "../src/recorder.ts";
 import { describeSeries, drawSeries, spansOf } from "../src/series.ts";
@@ -86,11 +87,13 @@ function portraitData(): PortraitData {
         { y: [1.9, 0.7], surfaces: [], stable: true, admissible: false },
       ],
       instant: null,
+      searched: "",
     },
     axes: [0, 1],
     box: boxOf(run, [0, 1]),
     states: ["y", "v"],
     surfaces: ["v"],
+    modes: new ModeNumbers(),
     start: [1, 2],
     marked: null,
     withModes: true,
@@ -134,6 +137,7 @@ test("the time series has a panel for each state, and the strip has the modes", 
     run,
     states: ["y", "v"],
     surfaces: ["v"],
+    modes: new ModeNumbers(),
     shown: [0, 1],
     window: [0, 5] as const,
     spans: spansOf(run),

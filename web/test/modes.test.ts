@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { explainMode, modeColour, modeRank, showMode, sortModes } from "../src/modes.ts";
+import { explainMode, ModeNumbers, modeRank, showMode, sortModes } from "../src/modes.ts";
 import { DARK, LIGHT } from "../src/theme.ts";
 
 /** All modes of m surfaces, sorted as the Python package sorts them: by codimension, then + before 0 before -. */
@@ -18,23 +18,28 @@ test("the rank of a mode is its place among all", () => {
   }
 });
 
-test("one surface: the colours of the Python package", () => {
+test("one surface: the colours of the Python package, whatever came first", () => {
+  const numbers = new ModeNumbers();
+  numbers.note(["0", "-"]);
   assert.deepEqual(
-    ["+", "-", "0"].map((mode) => modeColour(mode, LIGHT.colours)),
+    ["+", "-", "0"].map((mode) => numbers.colour(mode, LIGHT)),
     ["#0072b2", "#e69f00", "#009e73"],
   );
 });
 
-test("regions with a common surface never have the same colour, however many surfaces there are", () => {
-  for (const m of [1, 2, 5, 12, 40]) {
-    for (let k = 0; k < m; k++) {
-      const mode = Array.from({ length: m }, (_, j) => ((j * 7 + k) % 3 ? "+" : "-"));
-      const across = mode.map((sign, j) => (j === k ? (sign === "+" ? "-" : "+") : sign));
-      for (const { colours } of [LIGHT, DARK]) {
-        assert.equal(new Set(colours).size, 7);
-        assert.notEqual(modeColour(mode.join(""), colours), modeColour(across.join(""), colours));
-      }
-    }
+test("modes in one picture never share a colour: 21 have one of their own, the rest the faint ink", () => {
+  const modes = allModes(4);
+  for (const theme of [LIGHT, DARK]) {
+    const numbers = new ModeNumbers();
+    numbers.note(modes.slice(0, 21));
+    const colours = modes.slice(0, 21).map((mode) => numbers.colour(mode, theme));
+    assert.equal(new Set(colours).size, 21);
+    for (const mode of modes.slice(21)) assert.equal(numbers.colour(mode, theme), theme.faint);
+    // others that come later change none of them
+    assert.deepEqual(
+      modes.slice(0, 21).map((mode) => numbers.colour(mode, theme)),
+      colours,
+    );
   }
 });
 

@@ -3,17 +3,25 @@
 use std::rc::Rc;
 
 use filippov_expr::{BinaryOp, NodeId, UnaryOp};
-use ruff_python_ast::{BoolOp, CmpOp, Expr, Number, Operator, UnaryOp as Sign};
+use ruff_python_ast::{BoolOp, CmpOp, Comprehension, Expr, Number, Operator, UnaryOp as Sign};
 use ruff_text_size::Ranged;
 
-use crate::statements::Reader;
+use crate::arrays::items_of;
+use crate::calls::MOST_ENTRIES;
+use crate::laws::Laws;
+use crate::reader::Reader;
 use crate::unreadable::{refuse, Refused};
-use crate::values::Value;
+use crate::values::{Scope, Value};
 
 /// The largest whole number that is kept to the last digit.
 const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
+/// The largest power of a number that is multiplied out.
+const LARGEST_POWER: f64 = 64.0;
 
-impl Reader<'_> {
+/// What is done with each value of a comprehension.
+pub type OfEach<'f, 'a> = dyn FnMut(&mut Reader<'a>, Value) -> Result<(), Refused> + 'f;
+
+impl<'a> Reader<'a> {
     /// The value of an expression.
     pub fn value(&mut self, expression: &Expr) -> Result<Value, Refused> {
         match expression {
@@ -21,28 +29,44 @@ impl Reader<'_> {
                 Number::Float(value) => Ok(Value::float(*value)),
                 Number::Int(value) => {
                     let value = value.as_i64().map(|value| value as f64);
-                    let value = value.filter(|value| *value <= LARGEST_WHOLE);
-                    match value {
-                        Some(value) => Ok(Value::Number {
-                            value,
-                            is_whole: true,
-                        }),
+                    match value.filter(|value| *value <= LARGEST_WHOLE) {
+                        Some(value) => Ok(Value::whole(value)),
                         None => refuse(literal, "a whole number this large is not read here"),
                     }
                 }
                 Number::Complex { .. } => refuse(literal, "a complex number"),
             },
             Expr::BooleanLiteral(literal) => Ok(Value::Truth(literal.value)),
+            Expr::NoneLiteral(_) => Ok(Value::Nothing),
+            Expr::StringLiteral(literal) => Ok(Value::Text(literal.value.to_str().into())),
             Expr::Name(_) | Expr::Attribute(_) => self.named(expression),
-            Expr::Tuple(tuple) => self.list(&tuple.elts),
-            Expr::List(list) => self.list(&list.elts),
+            Expr::Tuple(tuple) => Ok(Value::tuple(self.listed(&tuple.elts)?)),
+            Expr::List(list) => Ok(Value::list(self.listed(&list.elts)?)),
+            Expr::ListComp(list) => self.collected(&list.elt, &list.generators),
+            Expr::Generator(list) => self.collected(&list.elt, &list.generators),
+            Expr::Dict(dict) => {
+                let mut pairs = Vec::new();
+                for item in &dict.items {
+                    let Some(key) = &item.key else {
+                        return refuse(dict, "** in a dict is not read here");
+                    };
+                    pairs.push((self.value(key)?, self.value(&item.value)?));
+                }
+                // Of equal keys the last one counts.
+                pairs.reverse();
+                Ok(Value::Dict(Rc::new(pairs)))
+            }
+            Expr::Lambda(lambda) => Ok(Value::Function(Rc::new(self.lambda(lambda)?))),
             Expr::Subscript(part) => self.entry(&part.value, &part.slice),
             Expr::BinOp(operation) => {
                 let left = self.value(&operation.left)?;
                 let right = self.value(&operation.right)?;
                 self.operation(operation, operation.op, &left, &right)
             }
-            Expr::UnaryOp(operation) => self.signed(operation.op, &operation.operand),
+            Expr::UnaryOp(operation) => {
+                let value = self.value(&operation.operand)?;
+                self.signed(&*operation.operand, operation.op, &value)
+            }
             Expr::Compare(_) => self.comparison(expression),
             Expr::BoolOp(operation) => {
                 let (last, others) = match operation.values.split_last() {
@@ -68,6 +92,86 @@ impl Reader<'_> {
         }
     }
 
+    /// The values of a list, with those behind a star.
+    pub fn listed(&mut self, items: &[Expr]) -> Result<Vec<Value>, Refused> {
+        let mut values = Vec::with_capacity(items.len());
+        for item in items {
+            match item {
+                Expr::Starred(star) => self.for_each(&star.value, &mut |_, value| {
+                    values.push(value);
+                    Ok(())
+                })?,
+                item => values.push(self.value(item)?),
+            }
+        }
+        Ok(values)
+    }
+
+    fn collected(
+        &mut self,
+        element: &Expr,
+        generators: &[Comprehension],
+    ) -> Result<Value, Refused> {
+        let mut values = Vec::new();
+        self.comprehend(element, generators, &mut |_, value| {
+            values.push(value);
+            Ok(())
+        })?;
+        Ok(Value::list(values))
+    }
+
+    /// Hands over the items of a list, an array or a generator, each as soon as it is there.
+    pub fn for_each(&mut self, values: &Expr, each: &mut OfEach<'_, 'a>) -> Result<(), Refused> {
+        if let Expr::Generator(list) = values {
+            return self.comprehend(&list.elt, &list.generators, each);
+        }
+        let found = self.value(values)?;
+        let items = items_of(values, &found)?;
+        items.into_iter().try_for_each(|item| each(self, item))
+    }
+
+    fn comprehend(
+        &mut self,
+        element: &Expr,
+        generators: &[Comprehension],
+        each: &mut OfEach<'_, 'a>,
+    ) -> Result<(), Refused> {
+        let Some((first, others)) = generators.split_first() else {
+            let value = self.value(element)?;
+            return each(self, value);
+        };
+        let values = self.value(&first.iter)?;
+        let around = Rc::clone(&self.scope);
+        self.scope = Scope::inside(&around);
+        let mut done = Ok(());
+        for item in items_of(&first.iter, &values)? {
+            done = self.turn_of(first, &item, element, others, each);
+            if done.is_err() {
+                break;
+            }
+        }
+        self.scope = around;
+        done
+    }
+
+    fn turn_of(
+        &mut self,
+        generator: &Comprehension,
+        item: &Value,
+        element: &Expr,
+        others: &[Comprehension],
+        each: &mut OfEach<'_, 'a>,
+    ) -> Result<(), Refused> {
+        self.take_turn(&generator.target)?;
+        self.bind(&generator.target, item)?;
+        for test in &generator.ifs {
+            if !self.holds(test)? {
+                return Ok(());
+            }
+        }
+        self.comprehend(element, others, each)
+    }
+
     /// Does a condition hold on this path?
     pub fn holds(&mut self, test: &Expr) -> Result<bool, Refused> {
         let value = self.value(test)?;
@@ -79,76 +183,33 @@ impl Reader<'_> {
             Value::Truth(holds) => Ok(*holds),
             Value::Number { value, .. } => Ok(*value != 0.0),
             Value::Condition(condition) => Ok(self.tracer.decide(condition)),
+            Value::Node(node) => match self.tracer.known_sign(*node) {
+                Some(sign) => Ok(sign != 0.0),
+                None => refuse(part, "a comparison is needed: write `v > 0`"),
+            },
             _ => refuse(part, "a comparison is needed: write `v > 0`"),
         }
-    }
-
-    fn list(&mut self, items: &[Expr]) -> Result<Value, Refused> {
-        let values = items.iter().map(|item| self.value(item));
-        Ok(Value::List(values.collect::<Result<_, _>>()?))
     }
 
     /// A name of the function, of the text around it, or of a library.
     fn named(&mut self, expression: &Expr) -> Result<Value, Refused> {
         if let Expr::Name(name) = expression {
-            let name = name.id.as_str();
-            let found = self
-                .names
-                .get(name)
-                .or_else(|| self.module.values.get(name));
-            if let Some(value) = found {
-                return Ok(value.clone());
+            if let Some(value) = self.scope.get(name.id.as_str()) {
+                return Ok(value);
             }
         }
-        match self.name_in_numpy_or_math(expression).as_deref() {
+        match self.name_in_library(expression).as_deref() {
             Some("numpy.pi" | "math.pi") => Ok(Value::float(std::f64::consts::PI)),
             Some("numpy.e" | "math.e") => Ok(Value::float(std::f64::consts::E)),
+            Some("math.tau") => Ok(Value::float(std::f64::consts::TAU)),
             Some(name) => refuse(expression, format!("{name} is not read here")),
             None => match expression {
                 Expr::Name(name) => {
                     refuse(expression, format!("the name {} is not known", name.id))
                 }
+                Expr::Attribute(part) => self.attribute(part),
                 _ => refuse(expression, "an attribute that is not read here"),
             },
-        }
-    }
-
-    /// What a dotted name means, if a library has it: `np.sin` is `numpy.sin`.
-    pub fn name_in_numpy_or_math(&self, expression: &Expr) -> Option<String> {
-        match expression {
-            Expr::Name(name) => {
-                let name = name.id.as_str();
-                let is_own = self.names.contains_key(name) || self.module.values.contains_key(name);
-                let meaning = self.module.imported.get(name).filter(|_| !is_own);
-                meaning.cloned()
-            }
-            Expr::Attribute(part) => {
-                let of = self.name_in_numpy_or_math(&part.value)?;
-                Some(format!("{of}.{}", part.attr))
-            }
-            _ => None,
-        }
-    }
-
-    fn entry(&mut self, list: &Expr, index: &Expr) -> Result<Value, Refused> {
-        let Value::List(values) = self.value(list)? else {
-            return refuse(list, "a number has no entries");
-        };
-        let place = match self.value(index)? {
-            Value::Number {
-                value,
-                is_whole: true,
-            } => value,
-            _ => return refuse(index, "an index is a whole number"),
-        };
-        let count = values.len() as f64;
-        let place = if place < 0.0 { place + count } else { place };
-        match values.get(place as usize).filter(|_| place >= 0.0) {
-            Some(value) => Ok(value.clone()),
-            None => refuse(
-                index,
-                format!("there are {} entries, from index 0", values.len()),
-            ),
         }
     }
 
@@ -160,29 +221,115 @@ impl Reader<'_> {
         left: &Value,
         right: &Value,
     ) -> Result<Value, Refused> {
+        if operator == Operator::MatMult {
+            return self.matrix_product(part, left, right);
+        }
+        let is_array = |value: &Value| matches!(value, Value::Array(_));
+        if is_array(left) || is_array(right) {
+            return self.by_elements(part, left, right, &mut |reader, a, b| {
+                reader.operation(part, operator, a, b)
+            });
+        }
+        match (operator, left, right) {
+            (Operator::Add, Value::List(a), Value::List(b)) if a.is_tuple == b.is_tuple => {
+                let joined = [a.items(), b.items()].concat();
+                return Ok(match a.is_tuple {
+                    true => Value::tuple(joined),
+                    false => Value::list(joined),
+                });
+            }
+            (Operator::Mult, Value::List(list), times)
+            | (Operator::Mult, times, Value::List(list)) => {
+                let Value::Number {
+                    value,
+                    is_whole: true,
+                } = *times
+                else {
+                    return refuse(
+                        part,
+                        "a list is repeated, not multiplied: write np.array([...])",
+                    );
+                };
+                let items = list.items();
+                if value * items.len() as f64 > MOST_ENTRIES as f64 {
+                    return refuse(part, "a list this long is not read here");
+                }
+                let repeated = vec![items; value.max(0.0) as usize].concat();
+                return Ok(match list.is_tuple {
+                    true => Value::tuple(repeated),
+                    false => Value::list(repeated),
+                });
+            }
+            _ => {}
+        }
         let op = match operator {
             Operator::Add => BinaryOp::Add,
             Operator::Sub => BinaryOp::Sub,
             Operator::Mult => BinaryOp::Mul,
             Operator::Div => BinaryOp::Div,
             Operator::Pow => BinaryOp::Pow,
-            Operator::BitAnd | Operator::BitOr => {
-                return self.logic(part, operator == Operator::BitAnd, left, right)
+            Operator::BitAnd | Operator::BitOr | Operator::BitXor => {
+                return self.logic(part, operator, left, right)
             }
-            Operator::FloorDiv | Operator::Mod => {
-                return refuse(
-                    part,
-                    "a floor or a remainder is not read here: it jumps at every whole number",
-                )
-            }
-            Operator::MatMult => return refuse(part, "a product of matrices is not read here"),
+            Operator::FloorDiv => return self.whole_quotient(part, left, right),
+            Operator::Mod => return self.remainder(part, left, right),
             _ => return refuse(part, "this operator is not read here"),
         };
         if let (Some(left), Some(right)) = (number(left), number(right)) {
             return arithmetic(part, op, left, right);
         }
         let (a, b) = self.operands(part, left, right)?;
-        Ok(Value::Node(self.tracer.binary(part, op, a, b)?))
+        self.tracer.place = part.range();
+        Ok(Value::Node(self.tracer.operation(op, a, b)))
+    }
+
+    /// `a // b`.
+    pub fn whole_quotient(
+        &mut self,
+        part: &impl Ranged,
+        left: &Value,
+        right: &Value,
+    ) -> Result<Value, Refused> {
+        if number(right).is_some_and(|(value, _)| value == 0.0) {
+            return refuse(part, "a remainder, or a whole quotient, by 0");
+        }
+        let quotient = self.operation(part, Operator::Div, left, right)?;
+        let floor = self.floor(part, &quotient)?;
+        let is_whole = |value: &Value| number(value).is_some_and(|(_, is_whole)| is_whole);
+        Ok(match (floor, is_whole(left) && is_whole(right)) {
+            (Value::Number { value, .. }, is_whole) => Value::Number { value, is_whole },
+            (other, _) => other,
+        })
+    }
+
+    /// `a % b`.
+    pub fn remainder(
+        &mut self,
+        part: &impl Ranged,
+        left: &Value,
+        right: &Value,
+    ) -> Result<Value, Refused> {
+        if let (Some((a, true)), Some((b, true))) = (number(left), number(right)) {
+            if b != 0.0 {
+                return Ok(Value::whole(a - b * (a / b).floor()));
+            }
+        }
+        if number(left).is_some() && number(right).is_some() {
+            return refuse(part, "a remainder of two numbers: write its value");
+        }
+        let whole = self.whole_quotient(part, left, right)?;
+        let product = self.operation(part, Operator::Mult, right, &whole)?;
+        self.operation(part, Operator::Sub, left, &product)
+    }
+
+    /// The largest whole number that is not above a value.
+    pub fn floor(&mut self, part: &impl Ranged, value: &Value) -> Result<Value, Refused> {
+        if let Some((value, _)) = number(value) {
+            return Ok(Value::float(value.floor()));
+        }
+        let node = self.node(part, value)?;
+        self.tracer.place = part.range();
+        Ok(Value::Node(Laws::floor(self.tracer, node)?))
     }
 
     /// The nodes of two values: Python asks the traced one of the two first.
@@ -193,64 +340,80 @@ impl Reader<'_> {
         right: &Value,
     ) -> Result<(NodeId, NodeId), Refused> {
         if number(left).is_some() {
-            let b = self.tracer.node(part, right)?;
-            return Ok((self.tracer.node(part, left)?, b));
+            let b = self.node(part, right)?;
+            return Ok((self.node(part, left)?, b));
         }
-        let a = self.tracer.node(part, left)?;
-        Ok((a, self.tracer.node(part, right)?))
+        let a = self.node(part, left)?;
+        Ok((a, self.node(part, right)?))
     }
 
-    /// Both conditions, or one of them at least.
+    /// Both conditions, one of them at least, or exactly one of them.
     pub fn logic(
         &mut self,
         part: &impl Ranged,
-        is_and: bool,
+        operator: Operator,
         left: &Value,
         right: &Value,
     ) -> Result<Value, Refused> {
         Ok(match (left, right) {
             (Value::Condition(a), Value::Condition(b)) => {
-                let joined = if is_and { a.and(b) } else { a.or(b) };
+                let joined = match operator {
+                    Operator::BitAnd => a.and(b),
+                    Operator::BitOr => a.or(b),
+                    _ => a.exactly_one(b),
+                };
                 Value::Condition(Rc::new(joined))
             }
             (Value::Truth(holds), other) | (other, Value::Truth(holds))
                 if matches!(other, Value::Truth(_) | Value::Condition(_)) =>
             {
-                if *holds == is_and {
-                    other.clone()
-                } else {
-                    Value::Truth(!is_and)
+                let opposite = |value: &Value| match value {
+                    Value::Condition(condition) => Value::Condition(Rc::new(condition.negated())),
+                    Value::Truth(holds) => Value::Truth(!holds),
+                    other => other.clone(),
+                };
+                match (operator, holds) {
+                    (Operator::BitXor, true) => opposite(other),
+                    (Operator::BitAnd, true) | (Operator::BitOr | Operator::BitXor, false) => {
+                        other.clone()
+                    }
+                    (Operator::BitAnd, false) => Value::Truth(false),
+                    _ => Value::Truth(true),
                 }
             }
             _ => return refuse(part, "two comparisons are needed"),
         })
     }
 
-    fn signed(&mut self, sign: Sign, operand: &Expr) -> Result<Value, Refused> {
-        let value = self.value(operand)?;
-        match (sign, &value) {
-            (Sign::Not, _) => Ok(Value::Truth(!self.truth(operand, &value)?)),
+    /// A value with a sign in front, or its opposite.
+    pub fn signed(
+        &mut self,
+        part: &impl Ranged,
+        sign: Sign,
+        value: &Value,
+    ) -> Result<Value, Refused> {
+        match (sign, value) {
+            (Sign::Not, _) => Ok(Value::Truth(!self.truth(part, value)?)),
+            (_, Value::Array(_)) => {
+                self.by_element(value, &mut |reader, item| reader.signed(part, sign, item))
+            }
             (Sign::Invert, Value::Condition(condition)) => {
                 Ok(Value::Condition(Rc::new(condition.negated())))
             }
-            (Sign::Invert, _) => refuse(operand, "a comparison is needed"),
-            (Sign::UAdd, Value::Number { .. } | Value::Node(_)) => Ok(value),
+            (Sign::Invert, _) => refuse(part, "a comparison is needed"),
+            (Sign::UAdd, Value::Number { .. } | Value::Node(_)) => Ok(value.clone()),
             // Of whole numbers, there is one zero only.
-            (Sign::USub, Value::Number { value, is_whole }) => Ok(Value::Number {
-                value: if *is_whole { 0.0 - value } else { -value },
-                is_whole: *is_whole,
+            (Sign::USub, &Value::Number { value, is_whole }) => Ok(Value::Number {
+                value: if is_whole { 0.0 - value } else { -value },
+                is_whole,
             }),
-            (_, Value::Truth(_)) => refuse(operand, "a sign before True or False"),
+            (_, Value::Truth(_)) => refuse(part, "a sign before True or False"),
             _ => {
-                let node = self.tracer.node(operand, &value)?;
-                match sign {
-                    Sign::UAdd => Ok(Value::Node(node)),
-                    _ => Ok(Value::Node(self.tracer.unary(
-                        operand,
-                        UnaryOp::Neg,
-                        node,
-                    )?)),
-                }
+                let node = self.node(part, value)?;
+                Ok(Value::Node(match sign {
+                    Sign::UAdd => node,
+                    _ => self.tracer.unary(UnaryOp::Neg, node),
+                }))
             }
         }
     }
@@ -280,16 +443,38 @@ impl Reader<'_> {
         left: &Value,
         right: &Value,
     ) -> Result<Value, Refused> {
+        let is_array = |value: &Value| matches!(value, Value::Array(_));
+        if is_array(left) || is_array(right) {
+            for side in [left, right] {
+                if let Value::Array(array) = side {
+                    if !array.is_traced && !array.is_of_numbers() {
+                        return refuse(part, "a comparison of an array that is made of traced values is not read here: write np.stack([...])");
+                    }
+                }
+            }
+            return self.by_elements(part, left, right, &mut |reader, a, b| {
+                reader.compared(part, op, a, b)
+            });
+        }
+        if let (CmpOp::Is | CmpOp::IsNot, Value::Nothing) = (op, right) {
+            return Ok(Value::Truth(
+                matches!(left, Value::Nothing) == (op == CmpOp::Is),
+            ));
+        }
         let (is_greater, is_strict) = match op {
             CmpOp::Gt => (true, true),
             CmpOp::GtE => (true, false),
             CmpOp::Lt => (false, true),
             CmpOp::LtE => (false, false),
             CmpOp::Eq | CmpOp::NotEq => {
-                return refuse(
-                    part,
-                    "`==` holds in instants only: write `>`, `>=`, `<` or `<=`",
-                )
+                let equal = self.equal(part, left, right)?;
+                return match op {
+                    CmpOp::Eq => Ok(equal),
+                    _ => match equal {
+                        Value::Truth(holds) => Ok(Value::Truth(!holds)),
+                        other => self.signed(part, Sign::Invert, &other),
+                    },
+                };
             }
             _ => return refuse(part, "this comparison is not read here"),
         };
@@ -302,8 +487,31 @@ impl Reader<'_> {
             return Ok(Value::Truth(if is_strict { a > b } else { a >= b }));
         }
         let (a, b) = self.operands(part, first, second)?;
-        let difference = self.tracer.binary(part, BinaryOp::Sub, a, b)?;
-        self.tracer.compare(part, difference, is_strict)
+        let difference = self.tracer.binary(BinaryOp::Sub, a, b);
+        self.tracer.place = part.range();
+        Ok(self.tracer.compare(difference, is_strict)?.value())
+    }
+
+    fn equal(&mut self, part: &impl Ranged, left: &Value, right: &Value) -> Result<Value, Refused> {
+        match (left, right) {
+            (Value::Text(a), Value::Text(b)) => return Ok(Value::Truth(a == b)),
+            (Value::Number { value: a, .. }, Value::Number { value: b, .. }) => {
+                return Ok(Value::Truth(a == b))
+            }
+            (Value::Node(_), Value::Node(_) | Value::Number { .. }) => {
+                let (a, b) = self.operands(part, left, right)?;
+                let difference = self.tracer.binary(BinaryOp::Sub, a, b);
+                self.tracer.place = part.range();
+                if let Some(answer) = self.tracer.equal(difference)? {
+                    return Ok(answer.value());
+                }
+            }
+            _ => {}
+        }
+        refuse(
+            part,
+            "`==` holds in instants only: write `>`, `>=`, `<` or `<=`",
+        )
     }
 }
 
@@ -329,14 +537,14 @@ fn arithmetic(
         BinaryOp::Mul => a * b,
         BinaryOp::Div if b == 0.0 => return refuse(part, "a division by zero"),
         BinaryOp::Div => return Ok(Value::float(a / b)),
-        // Products of whole numbers are exact; the last digit of other powers is that of a platform.
-        BinaryOp::Pow if is_whole && (0.0..64.0).contains(&b) => a.powi(b as i32),
-        _ => {
-            return refuse(
-                part,
-                "a power of two numbers is read for whole ones only: write its value",
-            )
-        }
+        // A good platform rounds these in the same way; the last digit of other powers differs among platforms.
+        _ => match power(a, b) {
+            Some(power) => power,
+            None => {
+                let error = "a power of two numbers is read with a whole exponent: write its value";
+                return refuse(part, error);
+            }
+        },
     };
     if is_whole && value.abs() > LARGEST_WHOLE {
         return refuse(part, "a whole number this large is not read here");
@@ -344,17 +552,30 @@ fn arithmetic(
     Ok(Value::Number { value, is_whole })
 }
 
+/// A power with a whole exponent, rounded once: the products are kept to twice the digits.
+fn power(a: f64, b: f64) -> Option<f64> {
+    if b.fract() != 0.0 || !(0.0..=LARGEST_POWER).contains(&b) {
+        return None;
+    }
+    let (mut high, mut low) = (1.0, 0.0);
+    for _ in 0..b as u32 {
+        let product = high * a;
+        let rest = f64::mul_add(high, a, -product) + low * a;
+        high = product + rest;
+        low = rest - (high - product);
+    }
+    high.is_finite().then_some(high)
+}
+
 fn what_it_is(expression: &Expr) -> &'static str {
     match expression {
-        Expr::Lambda(_) => "a lambda is not read here: write a def",
-        Expr::ListComp(_) | Expr::SetComp(_) | Expr::DictComp(_) | Expr::Generator(_) => {
-            "a comprehension is not read here: write its terms out"
+        Expr::SetComp(_) | Expr::DictComp(_) => {
+            "a comprehension of a dict or a set is not read here"
         }
-        Expr::Slice(_) => "a slice is not read here: name the entries",
-        Expr::StringLiteral(_) | Expr::FString(_) | Expr::BytesLiteral(_) => "a text is no number",
-        Expr::NoneLiteral(_) => "None is no number",
-        Expr::Starred(_) => "a star before an argument is not read here",
-        Expr::Dict(_) | Expr::Set(_) => "a dict or a set is not read here",
+        Expr::Slice(_) => "a slice stands behind an array or a list",
+        Expr::FString(_) | Expr::BytesLiteral(_) => "a text is no number",
+        Expr::Starred(_) => "a star is not read here",
+        Expr::Set(_) => "a set is not read here",
         Expr::Named(_) => "`:=` is not read here",
         _ => "this expression is not read here",
     }

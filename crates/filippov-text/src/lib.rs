@@ -1,10 +1,10 @@
 //! Right-hand sides typed as Python text: the same expressions as tracing the function gives, without Python.
 //!
-//! The text has one function `def fun(t, x, a=0.1, ...)`; imports of NumPy and `math` and numbers with a name may stand before it.
-//! Arguments with a default are parameters. The states have the names of the first unpacking, `y, v = x`. Read are assignments,
-//! arithmetic, functions of NumPy and `math`, comparisons, `and`, `or`, `not`, `np.where` and `if` with any branches. Everything
-//! else is refused by name, with its line and column: a model is never read as something that Python would not compute. So are
-//! models whose trace needs more than expressions, such as floors, comparisons within comparisons, and those of parameters alone.
+//! The model is the only system of the text, `@fl.system` or `fl.System(...)`, or the function with the name `rhs`, or the last
+//! function. Arguments with a number as default are parameters. States without names have those of the first unpacking, `y, v = x`.
+//! Read are imports, functions and lambdas, assignments, loops over lists, comprehensions, arithmetic, arrays with one or two axes,
+//! functions of NumPy and `math`, comparisons, `if` with any branches, floors, clocks, tables, the laws of the package, and resets.
+//! Everything else is refused by name, with its line and column: a model is never read as something that Python would not compute.
 //!
 //! As in tracing, the function is followed once for every combination of answers to its comparisons.
 //!
@@ -21,11 +21,20 @@
 
 #[cfg(target_arch = "wasm32")]
 mod abi;
+mod arrays;
 mod calls;
+mod constants_of_motion;
 mod expressions;
+mod laws;
+mod model;
 mod module;
+mod numpy;
+mod parts;
+mod questions;
+mod reader;
 mod reply;
 mod statements;
+mod tables;
 mod tracer;
 mod unreadable;
 mod values;

@@ -1,16 +1,23 @@
-//! A text as a whole: imports, numbers with a name, and the function.
+//! A text as a whole: imports, numbers and functions with a name, and the model.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
-use filippov::{Definition, SavedSystem};
+use filippov::SavedSystem;
 use filippov_expr::Names;
 use ruff_python_ast::visitor::{walk_expr, walk_stmt, Visitor};
-use ruff_python_ast::{Expr, Stmt, StmtFunctionDef};
+use ruff_python_ast::{Decorator, Expr, Stmt, StmtFunctionDef};
 
-use crate::statements::Reader;
+use crate::calls::Arguments;
+use crate::model::{traced, SystemText};
+use crate::reader::Reader;
+use crate::statements::{what_it_is, Flow};
 use crate::tracer::Tracer;
 use crate::unreadable::{refuse, Refused, Unreadable};
-use crate::values::Value;
+use crate::values::{Body, Scope, Value};
+
+/// The function that is the model where there are several.
+const MODEL: &str = "rhs";
 
 /// A system that was read from a text.
 #[derive(Clone, Debug)]
@@ -23,14 +30,6 @@ pub struct TextModel {
     pub y0: Option<Vec<f64>>,
     /// The numbers with the name `t_span` in the text, if it has any.
     pub t_span: Option<Vec<f64>>,
-}
-
-/// What stands outside of the function.
-#[derive(Default)]
-pub struct Module {
-    /// What a name of a library, or of a function of one, means: `np` is `numpy`, `sin` may be `numpy.sin`.
-    pub imported: BTreeMap<String, String>,
-    pub values: BTreeMap<String, Value>,
 }
 
 /// Reads a text.
@@ -50,19 +49,108 @@ pub fn read(source: &str) -> Result<TextModel, Unreadable> {
 }
 
 fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
-    let mut module = Module::default();
-    for library in ["numpy", "math"] {
-        module.imported.insert(library.into(), library.into());
+    let mut imported = BTreeMap::new();
+    for (name, library) in [("numpy", "numpy"), ("np", "numpy"), ("math", "math")] {
+        imported.insert(name.to_owned(), library.to_owned());
     }
-    module.imported.insert("np".into(), "numpy".into());
-    let mut function: Option<&StmtFunctionDef> = None;
+    note_imports(body, &mut imported);
+    let scope = Rc::new(Scope::default());
+    // Outside of functions nothing depends on the state.
+    let mut tracer = Tracer::new(Names::default(), Vec::new(), None);
+    let mut reader = Reader::new(&mut tracer, &imported, Rc::clone(&scope));
+    reader.is_outside = true;
+    let mut functions: Vec<String> = Vec::new();
+    let mut systems: Vec<(String, Rc<SystemText>)> = Vec::new();
+    for statement in body {
+        match statement {
+            Stmt::Import(_) | Stmt::ImportFrom(_) => {}
+            Stmt::FunctionDef(def) => {
+                let (name, value) = read_function(&mut reader, def)?;
+                match &value {
+                    Value::System(system) => systems.push((name.clone(), Rc::clone(system))),
+                    _ => functions.push(name.clone()),
+                }
+                scope.set(&name, value);
+            }
+            Stmt::If(chain) if is_for_a_script(&chain.test) => {}
+            Stmt::Assign(assign) => {
+                reader.run(std::slice::from_ref(statement))?;
+                if let [Expr::Name(name)] = &assign.targets[..] {
+                    let name = name.id.to_string();
+                    match scope.get(&name) {
+                        Some(Value::System(system)) => systems.push((name, system)),
+                        Some(Value::Function(_)) => functions.push(name),
+                        _ => {}
+                    }
+                }
+            }
+            Stmt::AnnAssign(_)
+            | Stmt::AugAssign(_)
+            | Stmt::For(_)
+            | Stmt::If(_)
+            | Stmt::Pass(_) => match reader.run(std::slice::from_ref(statement))? {
+                Flow::Next => {}
+                _ => return refuse(statement, what_it_is(statement)),
+            },
+            Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
+            other => {
+                let error =
+                    "outside of the function imports, numbers and functions with a name are read";
+                return refuse(other, error);
+            }
+        }
+    }
+    scope.names.borrow().values().for_each(Value::fix);
+    let numbers = |name: &str| numbers(scope.get(name).as_ref());
+    let (y0, t_span) = (numbers("y0"), numbers("t_span"));
+    let (name, system) = chosen(&scope, &functions, systems)?;
+    let function = &system.function;
+    let (n, states) = match (system.n, system.states.len()) {
+        (Some(n), 0) => (n, Vec::new()),
+        (None, 0) => {
+            let arguments = function.arguments();
+            let state = arguments.get(1).map_or("x", String::as_str);
+            let own = match &function.body {
+                Body::Statements(body) => unpacked(body, state),
+                Body::Expression(_) => None,
+            };
+            match (own, &y0) {
+                (Some(own), _) if own.iter().all(String::is_empty) => (own.len(), Vec::new()),
+                (Some(own), _) => (own.len(), own),
+                (None, Some(y0)) => (y0.len(), Vec::new()),
+                (None, None) => (count_states(&function.body, state), Vec::new()),
+            }
+        }
+        (n, count) if n.is_none_or(|n| n == count) => (count, system.states.clone()),
+        _ => {
+            return refuse(
+                &system.place,
+                "n is not the number of the names of the states",
+            )
+        }
+    };
+    Ok(TextModel {
+        name,
+        system: traced(&system, &imported, n, states)?,
+        y0,
+        t_span,
+    })
+}
+
+/// What names mean that are imported, in the whole text.
+fn note_imports(body: &[Stmt], imported: &mut BTreeMap<String, String>) {
     for statement in body {
         match statement {
             Stmt::Import(import) => {
                 for alias in &import.names {
-                    let local = alias.asname.as_ref().unwrap_or(&alias.name);
                     let name = alias.name.as_str();
-                    module.imported.insert(local.to_string(), name.to_owned());
+                    match &alias.asname {
+                        Some(local) => imported.insert(local.to_string(), name.to_owned()),
+                        None => {
+                            let first = name.split('.').next().unwrap_or(name);
+                            imported.insert(first.to_owned(), first.to_owned())
+                        }
+                    };
                 }
             }
             Stmt::ImportFrom(import) => {
@@ -70,146 +158,106 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
                 for alias in &import.names {
                     let local = alias.asname.as_ref().unwrap_or(&alias.name);
                     let name = format!("{library}.{}", alias.name);
-                    module.imported.insert(local.to_string(), name);
+                    imported.insert(local.to_string(), name);
                 }
             }
-            Stmt::FunctionDef(def) if function.is_some() => {
-                return refuse(
-                    def,
-                    "a second function: one function, def f(t, x, ...), is read",
-                );
-            }
-            Stmt::FunctionDef(def) => function = Some(def),
-            Stmt::Assign(assign) => {
-                let mut tracer = Tracer::default();
-                let mut reader = Reader::new(&mut tracer, &module);
-                let value = reader.value(&assign.value)?;
-                let is_plain = !has_node(&value);
-                match (&assign.targets[..], is_plain) {
-                    ([Expr::Name(name)], true) => {
-                        module.values.insert(name.id.to_string(), value);
-                    }
-                    _ => return refuse(assign, "outside of the function `name = number` is read"),
-                }
-            }
-            Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
-            other => {
-                let error = "outside of the function imports and `name = number` are read";
-                return refuse(other, error);
-            }
+            _ => {}
         }
     }
-    let Some(function) = function else {
-        return Err(Refused {
-            error: "a function, def f(t, x, ...), is needed".into(),
-            at: Default::default(),
-        });
-    };
-    read_function(function, &module)
 }
 
-fn has_node(value: &Value) -> bool {
-    match value {
-        Value::Number { .. } | Value::Truth(_) => false,
-        Value::List(items) => items.iter().any(has_node),
-        _ => true,
+/// Is it `__name__ == "__main__"`?
+fn is_for_a_script(test: &Expr) -> bool {
+    match test {
+        Expr::Compare(chain) => {
+            matches!(&*chain.left, Expr::Name(name) if name.id.as_str() == "__name__")
+        }
+        _ => false,
+    }
+}
+
+/// A function, or the system that a decorator makes of it.
+fn read_function(reader: &mut Reader, def: &StmtFunctionDef) -> Result<(String, Value), Refused> {
+    let function = Rc::new(reader.callable(def)?);
+    let name = def.name.to_string();
+    match &def.decorator_list[..] {
+        [] => Ok((name, Value::Function(function))),
+        [decorator] => {
+            let arguments = decorator_arguments(reader, decorator)?;
+            let system = reader.decorated(&def.name, function, arguments)?;
+            Ok((name, Value::System(Rc::new(system))))
+        }
+        _ => refuse(def, "one decorator, @fl.system, is read"),
+    }
+}
+
+fn decorator_arguments(reader: &mut Reader, decorator: &Decorator) -> Result<Arguments, Refused> {
+    let (function, keywords) = match &decorator.expression {
+        Expr::Call(call) => (&*call.func, &call.arguments.keywords[..]),
+        function => (function, &[][..]),
+    };
+    if reader.name_in_library(function).as_deref() != Some("filippov.system") {
+        return refuse(
+            decorator,
+            "a decorator other than @fl.system is not read here",
+        );
+    }
+    let mut named = BTreeMap::new();
+    for keyword in keywords {
+        if let Some(name) = &keyword.arg {
+            named.insert(name.to_string(), reader.value(&keyword.value)?);
+        }
+    }
+    Ok(Arguments {
+        given: Vec::new(),
+        named,
+    })
+}
+
+/// The model of the text: its only system, or the function with the name `rhs`, or its last function.
+fn chosen(
+    scope: &Scope,
+    functions: &[String],
+    systems: Vec<(String, Rc<SystemText>)>,
+) -> Result<(String, Rc<SystemText>), Refused> {
+    match &systems[..] {
+        [(name, system)] => return Ok((name.clone(), Rc::clone(system))),
+        [] => {}
+        [.., (_, last)] => return refuse(&last.place, "the text has several systems"),
+    }
+    let is_model = |name: &&String| matches!(scope.get(name), Some(Value::Function(function)) if function.arguments().len() >= 2);
+    let named = functions.iter().find(|name| *name == MODEL);
+    match named
+        .or_else(|| functions.iter().rev().find(is_model))
+        .or(functions.last())
+    {
+        Some(name) => match scope.get(name) {
+            Some(Value::Function(function)) => {
+                Ok((name.clone(), Rc::new(SystemText::of(function))))
+            }
+            _ => refuse(
+                &ruff_text_size::TextRange::default(),
+                "a function is needed",
+            ),
+        },
+        None => Err(Refused {
+            error: "a function, def f(t, x, ...), is needed".into(),
+            at: Default::default(),
+        }),
     }
 }
 
 fn numbers(value: Option<&Value>) -> Option<Vec<f64>> {
-    let Some(Value::List(items)) = value else {
-        return None;
+    let items = match value? {
+        Value::List(list) => list.items(),
+        Value::Array(array) => array.items.borrow().clone(),
+        _ => return None,
     };
-    let number = |item: &Value| match item {
-        Value::Number { value, .. } => Some(*value),
-        _ => None,
-    };
-    items.iter().map(number).collect()
+    items.iter().map(Value::number).collect()
 }
 
-fn read_function(def: &StmtFunctionDef, module: &Module) -> Result<TextModel, Refused> {
-    if def.is_async || !def.decorator_list.is_empty() {
-        return refuse(def, "a function without decorators, and not async, is read");
-    }
-    let arguments = &def.parameters;
-    if let Some(other) = arguments.vararg.as_deref().or(arguments.kwarg.as_deref()) {
-        return refuse(other, "arguments are read one by one, not as * or **");
-    }
-    let all: Vec<_> = arguments
-        .posonlyargs
-        .iter()
-        .chain(&arguments.args)
-        .chain(&arguments.kwonlyargs)
-        .collect();
-    let [time, state, parameters @ ..] = &all[..] else {
-        return refuse(&def.name, "the function needs two arguments, t and x");
-    };
-    let mut defaults = Vec::with_capacity(parameters.len());
-    for parameter in parameters {
-        let mut tracer = Tracer::default();
-        let mut reader = Reader::new(&mut tracer, module);
-        let name = &parameter.parameter.name;
-        match &parameter.default {
-            Some(default) => match reader.value(default)? {
-                Value::Number { value, .. } => defaults.push(value),
-                _ => return refuse(&**default, "the default of a parameter is a number"),
-            },
-            None => {
-                let error = format!("{name} needs a value: write {name}=1.0");
-                return refuse(&parameter.parameter, error);
-            }
-        }
-    }
-    let state_name = state.parameter.name.as_str();
-    let states = states_of(&def.body, state_name);
-    let n = states.len();
-    let mut tracer = Tracer::default();
-    let field = tracer.explore(&def.name, |tracer| {
-        let time_node = tracer.graph.time();
-        let nodes = (0..n as u32).map(|i| Value::Node(tracer.graph.state(i)));
-        let state_value = Value::List(nodes.collect());
-        let mut reader = Reader::new(tracer, module);
-        for (index, parameter) in parameters.iter().enumerate() {
-            let node = reader.tracer.graph.parameter(index as u32);
-            let name = parameter.parameter.name.to_string();
-            reader.names.insert(name, Value::Node(node));
-        }
-        let time_name = time.parameter.name.to_string();
-        reader.names.insert(time_name, Value::Node(time_node));
-        reader.names.insert(state_name.to_owned(), state_value);
-        reader.field(def, n)
-    })?;
-    tracer.check_asked(&field)?;
-    let is_named = !states.iter().all(String::is_empty);
-    let parameter_names = parameters.iter().map(|p| p.parameter.name.to_string());
-    let names = Names {
-        states: if is_named { states } else { Vec::new() },
-        parameters: parameter_names.collect(),
-    };
-    let definition = Definition {
-        graph: tracer.graph,
-        field,
-        names,
-        rules: Default::default(),
-    };
-    let system = SavedSystem {
-        definition,
-        defaults,
-        ..SavedSystem::default()
-    };
-    if let Err(error) = system.check() {
-        return refuse(&def.name, error.to_string());
-    }
-    Ok(TextModel {
-        name: def.name.to_string(),
-        system,
-        y0: numbers(module.values.get("y0")),
-        t_span: numbers(module.values.get("t_span")),
-    })
-}
-
-/// The names of the states: those of the first unpacking of the state; else as many empty ones as are indexed.
-fn states_of(body: &[Stmt], state: &str) -> Vec<String> {
+/// The names of the states in the first unpacking of the state: empty ones if they are no use as such.
+fn unpacked(body: &[Stmt], state: &str) -> Option<Vec<String>> {
     for statement in body {
         let Stmt::Assign(assign) = statement else {
             continue;
@@ -220,43 +268,47 @@ fn states_of(body: &[Stmt], state: &str) -> Vec<String> {
             Expr::List(list) => Some(&list.elts[..]),
             _ => None,
         });
-        if let Some(names) = names.filter(|_| is_state) {
+        let has_rest = |names: &&[Expr]| names.iter().any(Expr::is_starred_expr);
+        if let Some(names) = names.filter(|names| is_state && !has_rest(names)) {
             let name = |target: &Expr| match target {
                 Expr::Name(name) => name.id.to_string(),
                 _ => String::new(),
             };
             let names: Vec<String> = names.iter().map(name).collect();
-            // Names that are no use as such are dropped together, and the number stays.
             let mut sorted: Vec<&String> = names.iter().collect();
             sorted.sort_unstable();
             let is_usable = sorted.windows(2).all(|pair| pair[0] != pair[1]);
-            return match is_usable && !names.iter().any(String::is_empty) {
+            return Some(match is_usable && !names.iter().any(String::is_empty) {
                 true => names,
                 false => vec![String::new(); names.len()],
-            };
+            });
         }
     }
-    let counting = Counting {
-        state,
-        largest: 0,
-        returned: None,
-    };
-    vec![String::new(); counting.counted(body)]
+    None
 }
 
 /// Counts the states of a function that does not unpack them: as many as are returned in the first list or tuple, and as many as
 /// are indexed if there is none.
+fn count_states(body: &Body, state: &str) -> usize {
+    let mut counting = Counting {
+        state,
+        largest: 0,
+        returned: None,
+    };
+    match body {
+        Body::Statements(body) => counting.visit_body(body),
+        Body::Expression(body) => {
+            counting.returned = entries(body);
+            counting.visit_expr(body);
+        }
+    }
+    counting.returned.unwrap_or(counting.largest + 1)
+}
+
 struct Counting<'a> {
     state: &'a str,
     largest: usize,
     returned: Option<usize>,
-}
-
-impl Counting<'_> {
-    fn counted(mut self, body: &[Stmt]) -> usize {
-        self.visit_body(body);
-        self.returned.unwrap_or(self.largest + 1)
-    }
 }
 
 impl<'b> Visitor<'b> for Counting<'_> {
@@ -281,9 +333,13 @@ impl<'b> Visitor<'b> for Counting<'_> {
 
 /// The number of entries of a tuple, a list, or an array of one.
 fn entries(value: &Expr) -> Option<usize> {
+    let count = |items: &[Expr]| {
+        let has_rest = items.iter().any(Expr::is_starred_expr);
+        (!has_rest).then_some(items.len())
+    };
     match value {
-        Expr::Tuple(tuple) => Some(tuple.elts.len()),
-        Expr::List(list) => Some(list.elts.len()),
+        Expr::Tuple(tuple) => count(&tuple.elts),
+        Expr::List(list) => count(&list.elts),
         Expr::Call(call) => call.arguments.args.first().and_then(|first| match first {
             Expr::Tuple(_) | Expr::List(_) => entries(first),
             _ => None,

@@ -1,141 +1,192 @@
 //! Statements, on one path.
 
-use std::collections::BTreeMap;
+use std::rc::Rc;
 
-use filippov_expr::NodeId;
-use ruff_python_ast::{Expr, Stmt, StmtFunctionDef};
+use ruff_python_ast::{Expr, Stmt, StmtIf};
 
-use crate::module::Module;
-use crate::tracer::Tracer;
+use crate::arrays::items_of;
+use crate::reader::Reader;
 use crate::unreadable::{refuse, Refused};
 use crate::values::Value;
 
-/// Reads a body, or a part of one.
-pub struct Reader<'a> {
-    pub tracer: &'a mut Tracer,
-    pub module: &'a Module,
-    pub names: BTreeMap<String, Value>,
+/// Turns of a `while` whose end the state may decide.
+const MOST_TURNS_OF_WHILE: usize = 2000;
+
+/// How statements end.
+pub enum Flow {
+    /// At their last one.
+    Next,
+    Return(Value),
+    Break,
+    Continue,
 }
 
-impl<'a> Reader<'a> {
-    pub fn new(tracer: &'a mut Tracer, module: &'a Module) -> Self {
-        Reader {
-            tracer,
-            module,
-            names: BTreeMap::new(),
-        }
-    }
-
-    /// The nodes of the field that a function of n states returns on this path.
-    pub fn field(&mut self, def: &StmtFunctionDef, n: usize) -> Result<Vec<NodeId>, Refused> {
-        let Some((value, part)) = self.run(&def.body)? else {
-            return refuse(
-                &def.name,
-                "the function returns nothing: is a `return` missing?",
-            );
-        };
-        let values = match value {
-            Value::List(values) => values,
-            single => vec![single],
-        };
-        if values.len() != n {
-            let error = format!("{} values are returned for {n} states", values.len());
-            return refuse(part, error);
-        }
-        let nodes = values.iter().map(|value| self.tracer.node(part, value));
-        nodes.collect()
-    }
-
+impl Reader<'_> {
     /// Runs statements up to a `return`.
-    fn run<'s>(&mut self, body: &'s [Stmt]) -> Result<Option<(Value, &'s Expr)>, Refused> {
+    pub fn run(&mut self, body: &[Stmt]) -> Result<Flow, Refused> {
         for statement in body {
-            match statement {
-                Stmt::Return(found) => {
-                    let Some(value) = found.value.as_deref() else {
-                        return refuse(found, "a `return` without a value");
-                    };
-                    return Ok(Some((self.value(value)?, value)));
+            self.take_turn(statement)?;
+            match self.run_one(statement)? {
+                Flow::Next => {}
+                ended => return Ok(ended),
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    fn run_one(&mut self, statement: &Stmt) -> Result<Flow, Refused> {
+        match statement {
+            Stmt::Return(found) => {
+                let value = match found.value.as_deref() {
+                    Some(value) => self.value(value)?,
+                    None => Value::Nothing,
+                };
+                return Ok(Flow::Return(value));
+            }
+            Stmt::Assign(assign) => {
+                let value = self.value(&assign.value)?;
+                for target in &assign.targets {
+                    self.bind(target, &value)?;
                 }
-                Stmt::Assign(assign) => {
-                    let value = self.value(&assign.value)?;
-                    for target in &assign.targets {
-                        self.bind(target, &value)?;
-                    }
-                }
-                Stmt::AugAssign(assign) => {
-                    let before = self.value(&assign.target)?;
-                    let operand = self.value(&assign.value)?;
-                    let value = self.operation(assign, assign.op, &before, &operand)?;
+            }
+            Stmt::AnnAssign(assign) => {
+                if let Some(value) = &assign.value {
+                    let value = self.value(value)?;
                     self.bind(&assign.target, &value)?;
                 }
-                Stmt::If(chain) => {
-                    let mut branch = None;
-                    if self.holds(&chain.test)? {
-                        branch = Some(&chain.body);
-                    } else {
-                        for clause in &chain.elif_else_clauses {
-                            let is_taken = match &clause.test {
-                                Some(test) => self.holds(test)?,
-                                None => true,
-                            };
-                            if is_taken {
-                                branch = Some(&clause.body);
-                                break;
-                            }
-                        }
-                    }
-                    if let Some(body) = branch {
-                        if let Some(returned) = self.run(body)? {
-                            return Ok(Some(returned));
-                        }
+            }
+            Stmt::AugAssign(assign) => {
+                let before = self.value(&assign.target)?;
+                if matches!(before, Value::List(_) | Value::Array(_)) {
+                    let error =
+                        "a list or an array is not changed in place here: write `a = a + b`";
+                    return refuse(assign, error);
+                }
+                let operand = self.value(&assign.value)?;
+                let value = self.operation(assign, assign.op, &before, &operand)?;
+                self.bind(&assign.target, &value)?;
+            }
+            Stmt::If(chain) => {
+                if let Some(body) = self.branch(chain)? {
+                    return self.run(body);
+                }
+            }
+            Stmt::For(turns) => {
+                let values = self.value(&turns.iter)?;
+                for value in items_of(&*turns.iter, &values)? {
+                    self.take_turn(turns)?;
+                    self.bind(&turns.target, &value)?;
+                    match self.run(&turns.body)? {
+                        Flow::Next | Flow::Continue => {}
+                        Flow::Break => return Ok(Flow::Next),
+                        ended => return Ok(ended),
                     }
                 }
-                Stmt::Pass(_) => {}
-                Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
-                other => return refuse(other, what_it_is(other)),
+                return self.run(&turns.orelse);
+            }
+            Stmt::While(turns) => {
+                let mut n_turns = 0;
+                while self.holds(&turns.test)? {
+                    self.take_turn(turns)?;
+                    n_turns += 1;
+                    if n_turns > MOST_TURNS_OF_WHILE {
+                        return refuse(turns, "a loop whose length depends on the state");
+                    }
+                    match self.run(&turns.body)? {
+                        Flow::Next | Flow::Continue => {}
+                        Flow::Break => return Ok(Flow::Next),
+                        ended => return Ok(ended),
+                    }
+                }
+                return self.run(&turns.orelse);
+            }
+            Stmt::Break(_) => return Ok(Flow::Break),
+            Stmt::Continue(_) => return Ok(Flow::Continue),
+            Stmt::Pass(_) => {}
+            Stmt::FunctionDef(def) if def.decorator_list.is_empty() => {
+                let function = Value::Function(Rc::new(self.callable(def)?));
+                self.scope.set(def.name.as_str(), function);
+            }
+            Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
+            Stmt::Expr(call) => match &*call.value {
+                Expr::Call(call) if self.appends(call)? => {}
+                _ => {
+                    return refuse(
+                        call,
+                        "an expression whose value is not used is not read here",
+                    )
+                }
+            },
+            other => return refuse(other, what_it_is(other)),
+        }
+        Ok(Flow::Next)
+    }
+
+    /// The body that is run, if one is.
+    fn branch<'s>(&mut self, chain: &'s StmtIf) -> Result<Option<&'s [Stmt]>, Refused> {
+        if self.holds(&chain.test)? {
+            return Ok(Some(&chain.body));
+        }
+        for clause in &chain.elif_else_clauses {
+            let is_taken = match &clause.test {
+                Some(test) => self.holds(test)?,
+                None => true,
+            };
+            if is_taken {
+                return Ok(Some(&clause.body));
             }
         }
         Ok(None)
     }
 
-    fn bind(&mut self, target: &Expr, value: &Value) -> Result<(), Refused> {
+    pub fn bind(&mut self, target: &Expr, value: &Value) -> Result<(), Refused> {
         let targets = match target {
             Expr::Name(name) => {
-                self.names.insert(name.id.to_string(), value.clone());
+                self.scope.set(name.id.as_str(), value.clone());
                 return Ok(());
             }
             Expr::Tuple(tuple) => &tuple.elts,
             Expr::List(list) => &list.elts,
-            other => {
-                let error =
-                    "only names are assigned to, not parts of arrays or objects: return a tuple";
-                return refuse(other, error);
-            }
+            Expr::Subscript(part) => return self.assign_entry(&part.value, &part.slice, value),
+            other => return refuse(other, "this is not assigned to here: return a tuple"),
         };
-        let Value::List(values) = value else {
+        if !matches!(value, Value::List(_) | Value::Array(_)) {
             return refuse(target, "one number cannot be unpacked");
-        };
-        if targets.len() != values.len() {
+        }
+        let values = items_of(target, value)?;
+        let star = targets.iter().position(Expr::is_starred_expr);
+        let n_named = targets.len() - usize::from(star.is_some());
+        if values.len() < n_named || star.is_none() && values.len() > n_named {
             let error = format!("{} values for {} names", values.len(), targets.len());
             return refuse(target, error);
         }
-        let mut pairs = targets.iter().zip(values);
-        pairs.try_for_each(|(target, value)| self.bind(target, value))
+        let n_rest = values.len() - n_named;
+        let mut values = values.into_iter();
+        for target in targets {
+            match target {
+                Expr::Starred(rest) => {
+                    let rest_values = values.by_ref().take(n_rest).collect();
+                    self.bind(&rest.value, &Value::list(rest_values))?;
+                }
+                target => {
+                    if let Some(value) = values.next() {
+                        self.bind(target, &value)?;
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 }
 
-fn what_it_is(statement: &Stmt) -> &'static str {
+pub fn what_it_is(statement: &Stmt) -> &'static str {
     match statement {
-        Stmt::For(_) | Stmt::While(_) => "a loop is not read here: write its turns out",
-        Stmt::FunctionDef(_) | Stmt::ClassDef(_) => {
-            "a function or a class in the function is not read here"
-        }
-        Stmt::AnnAssign(_) => "an annotation is not read here: write `name = value`",
+        Stmt::FunctionDef(_) => "a function with a decorator is read as the model only",
+        Stmt::ClassDef(_) => "a class is not read here",
         Stmt::Import(_) | Stmt::ImportFrom(_) => "an import belongs above the function",
         Stmt::Try(_) | Stmt::Raise(_) | Stmt::Assert(_) => "exceptions are not read here",
         Stmt::With(_) => "`with` is not read here",
         Stmt::Global(_) | Stmt::Nonlocal(_) => "names outside of the function cannot be changed",
-        Stmt::Expr(_) => "an expression whose value is not used is not read here",
         _ => "this statement is not read here",
     }
 }

@@ -1,32 +1,112 @@
 //! The expressions so far, and the answers to comparisons on the present path.
 //!
-//! What is done here to a graph is what `python/filippov/trace/` does, in the same order, so that the graphs are the same.
+//! What is done here to a graph is what `python/filippov/trace/` does, in the same order, so that the graphs are the same:
+//! this file is `branching.py`, the others are `laws.rs`, `tables.rs` and `questions.rs`.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
-use filippov_expr::{roots, BinaryOp, Graph, NodeId, Switching, UnaryOp};
-use ruff_text_size::Ranged;
+use filippov_expr::{roots, BinaryOp, Graph, Names, NodeId, Pieces, Regions, Switching, UnaryOp};
+use ruff_text_size::{Ranged, TextRange};
 
+use crate::constants_of_motion::Constants;
+use crate::laws::Laws;
+use crate::parts::{condition_of, equality_of, has_known_signs_alone, parts_of, sign_of};
 use crate::unreadable::{refuse, Refused};
-use crate::values::{Condition, Value};
+use crate::values::{Answer, Condition};
 
 /// Most combinations of answers that are followed.
 const MOST_PATHS: usize = 256;
+/// Combinations of inner signs looked at for each comparison; for each one after several that have more.
+const MOST_COMBINATIONS: usize = 1024;
+const MOST_AFTER_MANY: usize = 32;
+const MANY: usize = 3;
+/// An expression that jumps is taken apart into that many parts at most.
+const MOST_JUMPING_PARTS: usize = 32;
 
-/// Traces one function.
-#[derive(Default)]
+/// What was asked about an expression.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    Comparison { is_strict: bool },
+    Sign,
+    Quantiser,
+    Hysteresis,
+}
+
+/// A question, and where in the text it was asked first.
+#[derive(Clone, Copy, Debug)]
+pub struct Question {
+    pub node: NodeId,
+    pub kind: Kind,
+    pub place: TextRange,
+}
+
+/// A root as a function of its argument.
+#[derive(Clone, Copy, Debug)]
+pub enum Root {
+    Square,
+    Power(NodeId),
+    Cube,
+}
+
+/// Traces one system, or one map.
 pub struct Tracer {
     pub graph: Graph,
+    /// Names of the states and of the parameters, those of laws behind them.
+    pub names: Names,
+    /// The values of the parameters.
+    pub values: Vec<f64>,
+    pub laws: Laws,
+    pub questions: Vec<Question>,
+    /// Expressions of which it was not found out whether they are zero in some region.
+    pub unresolved: Vec<NodeId>,
+    /// Whether the expressions hold for these values of the parameters only.
+    pub is_pinned: bool,
+    /// Whether an answer was put together from those in pieces.
+    pub has_pieces: bool,
+    /// What was compared while the constants of motion are not known, and whether that mattered.
+    pub asked: Vec<NodeId>,
+    pub is_doubtful: bool,
+    /// The part of the text that is read now.
+    pub place: TextRange,
+    constants: Option<Constants>,
+    pieces: BTreeMap<(NodeId, bool), Option<Pieces>>,
+    signs: BTreeMap<NodeId, f64>,
+    continued: Vec<(NodeId, NodeId)>,
+    roots: Vec<(NodeId, NodeId, Root)>,
     /// The decisions of the present path, and which of them were made the other way round already.
     path: Vec<(u32, f64)>,
     flipped: Vec<bool>,
     /// The answers given on it.
     answers: BTreeMap<u32, f64>,
-    /// What was compared with zero, and where.
-    asked: Vec<(NodeId, ruff_text_size::TextRange)>,
 }
 
 impl Tracer {
+    /// A tracer for a function of these states and parameters. The first trace does not know the constants of motion.
+    pub fn new(names: Names, values: Vec<f64>, constants: Option<Constants>) -> Self {
+        Tracer {
+            graph: Graph::new(),
+            laws: Laws::new(values.len()),
+            names,
+            values,
+            questions: Vec::new(),
+            unresolved: Vec::new(),
+            is_pinned: false,
+            has_pieces: false,
+            asked: Vec::new(),
+            is_doubtful: false,
+            place: TextRange::default(),
+            constants,
+            pieces: BTreeMap::new(),
+            signs: BTreeMap::new(),
+            continued: Vec::new(),
+            roots: Vec::new(),
+            path: Vec::new(),
+            flipped: Vec::new(),
+            answers: BTreeMap::new(),
+        }
+    }
+
     /// Follows a function on every path; its results, merged.
     pub fn explore(
         &mut self,
@@ -35,6 +115,8 @@ impl Tracer {
     ) -> Result<Vec<NodeId>, Refused> {
         let mut waiting: Vec<Vec<NodeId>> = Vec::new();
         let mut n_paths = 0;
+        self.path.clear();
+        self.flipped.clear();
         loop {
             self.answers.clear();
             let mut outcome = call(self)?;
@@ -68,111 +150,49 @@ impl Tracer {
         }
     }
 
-    /// Refuses comparisons of what no motion changes: they have no surfaces.
-    pub fn check_asked(&self, field: &[NodeId]) -> Result<(), Refused> {
-        for (node, range) in &self.asked {
-            let terms = self.graph.rate_terms(*node);
-            if terms.is_some_and(|terms| self.graph.is_constant_of_motion(&terms, field)) {
-                let error =
-                    "a comparison of what stays as it is along every motion is not read here";
-                return refuse(range, error);
-            }
-        }
-        Ok(())
-    }
-
-    /// The node of a number.
-    pub fn node(&mut self, part: &impl Ranged, value: &Value) -> Result<NodeId, Refused> {
-        match value {
-            Value::Node(node) => Ok(*node),
-            Value::Number { value, .. } => Ok(self.graph.constant(*value)),
-            Value::Truth(holds) => Ok(self.graph.constant(f64::from(u8::from(*holds)))),
-            Value::Condition(condition) => {
-                let (one, zero) = (self.graph.constant(1.0), self.graph.constant(0.0));
-                Ok(self.choose(condition, one, zero))
-            }
-            Value::List(_) => refuse(part, "a number is needed, this is a list or an array"),
+    /// The answer to a condition on the present path; a new one is answered by yes first.
+    pub fn decide(&mut self, condition: &Condition) -> bool {
+        match condition {
+            &Condition::Comparison {
+                surface,
+                orientation,
+            } => self.decide_side(surface, orientation),
+            Condition::Both {
+                first,
+                second,
+                is_opposite,
+            } => (self.decide(first) && self.decide(second)) != *is_opposite,
+            Condition::BySide {
+                surface,
+                plus,
+                minus,
+            } => match self.decide_side(*surface, 1.0) {
+                true => self.decide_answer(plus),
+                false => self.decide_answer(minus),
+            },
         }
     }
 
-    /// A function of an expression.
-    pub fn unary(&mut self, part: &impl Ranged, op: UnaryOp, a: NodeId) -> Result<NodeId, Refused> {
-        if op == UnaryOp::Sqrt && self.graph.has_signs(a) {
-            return refuse(
-                part,
-                "a root of what contains a comparison is not read here",
-            );
+    fn decide_answer(&mut self, answer: &Answer) -> bool {
+        match answer {
+            Answer::Known(holds) => *holds,
+            Answer::Open(condition) => self.decide(condition),
         }
-        Ok(roots::apply(&mut self.graph, op, a))
     }
 
-    /// An operation on two expressions.
-    pub fn binary(
-        &mut self,
-        part: &impl Ranged,
-        op: BinaryOp,
-        a: NodeId,
-        b: NodeId,
-    ) -> Result<NodeId, Refused> {
-        if op == BinaryOp::Pow {
-            let exponent = self.graph.as_constant(b);
-            let is_root = exponent.is_some_and(|power| power > 0.0 && power.fract() != 0.0);
-            if is_root && self.graph.has_signs(a) {
-                return refuse(
-                    part,
-                    "a root of what contains a comparison is not read here",
-                );
+    fn decide_side(&mut self, surface: u32, orientation: f64) -> bool {
+        let depth = self.answers.len();
+        let sign = match self.answers.get(&surface) {
+            Some(&sign) => sign,
+            None if depth < self.path.len() => self.path[depth].1,
+            None => {
+                self.path.push((surface, orientation));
+                self.flipped.push(false);
+                orientation
             }
-        }
-        Ok(roots::apply_to_two(&mut self.graph, op, a, b))
-    }
-
-    /// The sign of an expression.
-    pub fn sign(&mut self, part: &impl Ranged, a: NodeId) -> Result<NodeId, Refused> {
-        self.ask(part, a)?;
-        Ok(self.graph.sign(a))
-    }
-
-    /// The absolute value of an expression.
-    pub fn absolute(&mut self, part: &impl Ranged, a: NodeId) -> Result<NodeId, Refused> {
-        self.ask(part, a)?;
-        Ok(self.graph.abs(a))
-    }
-
-    /// The larger or the smaller one of two expressions.
-    pub fn extreme(
-        &mut self,
-        part: &impl Ranged,
-        a: NodeId,
-        b: NodeId,
-        is_largest: bool,
-    ) -> Result<NodeId, Refused> {
-        let difference = self.binary(part, BinaryOp::Sub, a, b)?;
-        self.ask(part, difference)?;
-        Ok(match is_largest {
-            true => self.graph.maximum(a, b),
-            false => self.graph.minimum(a, b),
-        })
-    }
-
-    /// The condition that an expression is positive, or not negative.
-    pub fn compare(
-        &mut self,
-        part: &impl Ranged,
-        a: NodeId,
-        is_strict: bool,
-    ) -> Result<Value, Refused> {
-        self.ask(part, a)?;
-        Ok(match self.graph.switch(a) {
-            Switching::Constant(sign) => Value::Truth(sign > 0.0 || !is_strict && sign == 0.0),
-            Switching::Surface { index, orientation } => {
-                let comparison = Condition::Comparison {
-                    surface: index,
-                    orientation,
-                };
-                Value::Condition(comparison.into())
-            }
-        })
+        };
+        self.answers.insert(surface, sign);
+        orientation * sign > 0.0
     }
 
     /// One node where a condition holds, the other one elsewhere.
@@ -194,52 +214,499 @@ impl Tracer {
                 let inner = self.choose(second, plus, minus);
                 self.choose(first, inner, minus)
             }
-        }
-    }
-
-    /// The answer to a condition on the present path; a new one is answered by yes first.
-    pub fn decide(&mut self, condition: &Condition) -> bool {
-        match condition {
-            &Condition::Comparison {
+            Condition::BySide {
                 surface,
-                orientation,
+                plus: above,
+                minus: below,
             } => {
-                let depth = self.answers.len();
-                let sign = match self.answers.get(&surface) {
-                    Some(&sign) => sign,
-                    None if depth < self.path.len() => self.path[depth].1,
-                    None => {
-                        self.path.push((surface, orientation));
-                        self.flipped.push(false);
-                        orientation
-                    }
-                };
-                self.answers.insert(surface, sign);
-                orientation * sign > 0.0
+                let [above, below] = [above, below].map(|side| match side {
+                    Answer::Known(true) => plus,
+                    Answer::Known(false) => minus,
+                    Answer::Open(condition) => self.choose(condition, plus, minus),
+                });
+                self.graph.select(*surface, 1.0, above, below)
             }
-            Condition::Both {
-                first,
-                second,
-                is_opposite,
-            } => (self.decide(first) && self.decide(second)) != *is_opposite,
         }
     }
 
-    /// What is compared with zero must change along motions, and contain no comparison.
-    fn ask(&mut self, part: &impl Ranged, a: NodeId) -> Result<(), Refused> {
-        if !self.graph.depends_on_motion(a) {
-            return refuse(
-                part,
-                "a comparison of parameters and numbers alone is not read here: it is decided once, by the values given",
-            );
+    // ------------------------------------------------------------ expressions
+
+    pub fn refuse<T>(&self, error: impl Into<String>) -> Result<T, Refused> {
+        refuse(&self.place, error)
+    }
+
+    /// An expression in print.
+    pub fn text(&self, node: NodeId) -> String {
+        self.graph.text(node, &self.names)
+    }
+
+    pub fn binary(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
+        roots::apply_to_two(&mut self.graph, op, a, b)
+    }
+
+    pub fn unary(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
+        roots::apply(&mut self.graph, op, a)
+    }
+
+    /// A function of an expression as NumPy has it: with roots continued.
+    pub fn function(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
+        match op {
+            UnaryOp::Sqrt => self.root(a, Root::Square),
+            UnaryOp::Cbrt => {
+                let root = self.unary(op, a);
+                self.note_root(root, a, Root::Cube);
+                root
+            }
+            _ => self.unary(op, a),
         }
-        if self.graph.has_signs(a) {
-            return refuse(
-                part,
-                "a comparison of what contains a comparison itself is not read here",
-            );
+    }
+
+    /// An operation on two expressions: a power may be a root.
+    pub fn operation(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
+        let power = match op {
+            BinaryOp::Pow => self.graph.as_constant(b),
+            _ => None,
+        };
+        match power {
+            Some(power) if power > 0.0 && power.fract() != 0.0 => self.root(a, Root::Power(b)),
+            _ => self.binary(op, a, b),
         }
-        self.asked.push((a, part.range()));
-        Ok(())
+    }
+
+    /// The sign of an expression.
+    pub fn sign(&mut self, node: NodeId) -> Result<NodeId, Refused> {
+        if let Some(known) = self.sign_everywhere(node)? {
+            return Ok(self.graph.constant(known));
+        }
+        if self.is_constant_of_motion(node) {
+            return Laws::sign(self, node);
+        }
+        if Laws::is_held(self, node) {
+            let whole = Laws::whole(self, node)?;
+            return Ok(self.sign_of_whole_number(whole));
+        }
+        if let Some(pieces) = self.pieces(node, false)? {
+            self.has_pieces = true;
+            return sign_of(self, &pieces);
+        }
+        if self.is_stepwise(node) {
+            return Ok(self.sign_of_whole_number(node));
+        }
+        let node = self.as_surface(node);
+        self.ask(node, Kind::Sign);
+        Ok(self.graph.sign(node))
+    }
+
+    /// The sign of what may be zero for a while, where its sign is 0.
+    fn sign_of_whole_number(&mut self, node: NodeId) -> NodeId {
+        let sides = [-1.0, 1.0].map(|side| {
+            let beside = Laws::beside(self, node, side);
+            self.graph.sign(beside)
+        });
+        let both = self.binary(BinaryOp::Add, sides[0], sides[1]);
+        let half = self.graph.constant(0.5);
+        self.binary(BinaryOp::Mul, half, both)
+    }
+
+    /// The absolute value of an expression.
+    pub fn absolute(&mut self, node: NodeId) -> Result<NodeId, Refused> {
+        if let Some(known) = self.sign_everywhere(node)? {
+            return Ok(if known >= 0.0 {
+                node
+            } else {
+                self.unary(UnaryOp::Neg, node)
+            });
+        }
+        if self.is_constant_of_motion(node) {
+            let sign = Laws::sign(self, node)?;
+            return Ok(self.binary(BinaryOp::Mul, sign, node));
+        }
+        if self.pieces(node, false)?.is_none() && !self.is_stepwise(node) {
+            self.switch_as_surface(node);
+            return Ok(self.graph.abs(node));
+        }
+        let opposite = self.unary(UnaryOp::Neg, node);
+        self.choose_by(node, node, opposite)
+    }
+
+    /// The larger or the smaller one of two expressions.
+    pub fn extreme(
+        &mut self,
+        first: NodeId,
+        second: NodeId,
+        is_largest: bool,
+    ) -> Result<NodeId, Refused> {
+        let difference = self.binary(BinaryOp::Sub, first, second);
+        if let Some(known) = self.sign_everywhere(difference)? {
+            return Ok(if (known >= 0.0) == is_largest {
+                first
+            } else {
+                second
+            });
+        }
+        let is_plain = self.pieces(difference, false)?.is_none() && !self.is_stepwise(difference);
+        if is_plain && !self.is_constant_of_motion(difference) {
+            self.switch_as_surface(difference);
+            return Ok(match is_largest {
+                true => self.graph.maximum(first, second),
+                false => self.graph.minimum(first, second),
+            });
+        }
+        match is_largest {
+            true => self.choose_by(difference, first, second),
+            false => self.choose_by(difference, second, first),
+        }
+    }
+
+    /// One node where an expression is not negative, another one elsewhere.
+    pub fn choose_by(
+        &mut self,
+        node: NodeId,
+        plus: NodeId,
+        minus: NodeId,
+    ) -> Result<NodeId, Refused> {
+        Ok(match self.compare(node, false)? {
+            Answer::Known(true) => plus,
+            Answer::Known(false) => minus,
+            Answer::Open(condition) => self.choose(&condition, plus, minus),
+        })
+    }
+
+    /// The condition that an expression is positive, or not negative.
+    pub fn compare(&mut self, node: NodeId, is_strict: bool) -> Result<Answer, Refused> {
+        let mut node = node;
+        let known = match self.sign_everywhere(node)? {
+            Some(known) => known,
+            None => {
+                if self.is_constant_of_motion(node) {
+                    node = Laws::sign(self, node)?;
+                }
+                let side = if is_strict { -1.0 } else { 1.0 };
+                if Laws::is_held(self, node) {
+                    let whole = Laws::whole(self, node)?;
+                    node = Laws::beside(self, whole, side);
+                }
+                if let Some(pieces) = self.pieces(node, false)? {
+                    self.has_pieces = true;
+                    return condition_of(self, &pieces, is_strict);
+                }
+                if self.is_stepwise(node) {
+                    node = Laws::beside(self, node, side);
+                }
+                node = self.as_surface(node);
+                self.ask(node, Kind::Comparison { is_strict });
+                match self.graph.switch(node) {
+                    Switching::Surface { index, orientation } => {
+                        let comparison = Condition::Comparison {
+                            surface: index,
+                            orientation,
+                        };
+                        return Ok(Answer::Open(Rc::new(comparison)));
+                    }
+                    Switching::Constant(sign) => sign,
+                }
+            }
+        };
+        Ok(Answer::Known(known > 0.0 || !is_strict && known == 0.0))
+    }
+
+    /// The sign of an expression if it is the same at all points but single ones.
+    fn sign_everywhere(&mut self, node: NodeId) -> Result<Option<f64>, Refused> {
+        let mut known = match self.values.is_empty() {
+            true => None,
+            false => self.known_sign(node),
+        };
+        if known.is_none() && !self.laws.is_empty() && self.graph.has_signs(node) {
+            self.pieces(node, false)?;
+            known = self.signs.get(&node).copied();
+            self.has_pieces |= known.is_some();
+        }
+        Ok(known)
+    }
+
+    /// The condition that an expression is zero; `None` if that is so at single points only.
+    pub fn equal(&mut self, node: NodeId) -> Result<Option<Answer>, Refused> {
+        if let Some(known) = self.known_sign(node) {
+            return Ok(Some(Answer::Known(known == 0.0)));
+        }
+        let mut node = node;
+        if self.is_constant_of_motion(node) {
+            node = Laws::sign(self, node)?;
+        }
+        if Laws::is_held(self, node) {
+            return Ok(Some(self.is_held_at_zero(node)?));
+        }
+        let pieces = self.pieces(node, true)?;
+        self.has_pieces = true;
+        let answer = match &pieces {
+            Some(pieces) => equality_of(self, pieces)?,
+            None => None,
+        };
+        if answer.is_none() && self.constants.is_none() {
+            self.is_doubtful = true;
+            return Ok(Some(self.compare(node, true)?));
+        }
+        Ok(answer)
+    }
+
+    /// The condition that an expression of discrete states is zero.
+    pub fn is_held_at_zero(&mut self, node: NodeId) -> Result<Answer, Refused> {
+        let is_positive = self.compare(node, true)?;
+        let opposite = self.unary(UnaryOp::Neg, node);
+        let is_negative = self.compare(opposite, true)?;
+        Ok(is_positive.negated().and(&is_negative.negated()))
+    }
+
+    /// Does an expression contain signs and change only where they or discrete states in it do?
+    pub fn is_stepwise(&self, node: NodeId) -> bool {
+        self.graph.has_signs(node) && self.graph.is_stepwise(node)
+    }
+
+    pub fn is_constant_of_motion(&mut self, node: NodeId) -> bool {
+        match &self.constants {
+            Some(constants) => constants.have(&self.graph, node),
+            None => {
+                self.asked.push(node);
+                false
+            }
+        }
+    }
+
+    /// An expression in pieces; `None` if it is nowhere seen to be identically zero.
+    pub fn pieces(&mut self, node: NodeId, in_full: bool) -> Result<Option<Pieces>, Refused> {
+        if let Some(known) = self.pieces.get(&(node, in_full)) {
+            return Ok(known.clone());
+        }
+        if !self.graph.has_signs(node) {
+            if Laws::stands_still_in_pieces(self, node) {
+                return self.refuse(
+                    "a comparison, a floor or a root of a table that stands still in some of its pieces is not read here",
+                );
+            }
+            self.pieces.insert((node, in_full), None);
+            return Ok(None);
+        }
+        let most = match self.unresolved.len() < MANY {
+            true => MOST_COMBINATIONS,
+            false => MOST_AFTER_MANY,
+        };
+        let (mut pieces, for_these_values) = self.in_regions(|regions| {
+            let pieces = regions.pieces(node, most, in_full);
+            (pieces, regions.used_parameters())
+        });
+        self.is_pinned |= for_these_values;
+        if pieces.is_none() && !self.graph.is_stepwise(node) && !self.unresolved.contains(&node) {
+            self.unresolved.push(node);
+        }
+        // An expression of one sign, zeros at single points aside, is left to its surface.
+        let is_whole = match &pieces {
+            None => true,
+            Some(Pieces::Part(_, sign)) => {
+                let is_zero = *sign == filippov_expr::PartSign::Known(0.0);
+                if let (filippov_expr::PartSign::Known(sign), false, false) =
+                    (*sign, in_full, is_zero)
+                {
+                    self.signs.insert(node, sign);
+                }
+                !in_full && !is_zero
+            }
+            Some(_) => false,
+        };
+        if is_whole {
+            pieces = match in_full {
+                true => None,
+                false => self.jumping_parts(node)?,
+            };
+        }
+        self.pieces.insert((node, in_full), pieces.clone());
+        Ok(pieces)
+    }
+
+    /// The parts of an expression that jumps with a sign inside of it: each switches where it does.
+    fn jumping_parts(&mut self, node: NodeId) -> Result<Option<Pieces>, Refused> {
+        if Laws::reads_any(self, node) {
+            return Ok(None);
+        }
+        let (parts, for_these_values) = self.in_regions(|regions| {
+            let parts = regions.pieces(node, MOST_JUMPING_PARTS, true);
+            (parts, regions.used_parameters())
+        });
+        if parts.is_none() || for_these_values || !self.jumps(node) {
+            return Ok(None);
+        }
+        Ok(parts)
+    }
+
+    /// Asks for regions in the graph itself, which receives new nodes.
+    fn in_regions<T>(&mut self, ask: impl FnOnce(&mut Regions) -> T) -> T {
+        let graph = std::mem::take(&mut self.graph);
+        let mut regions = Regions::new(graph, self.values.clone(), self.laws.discrete());
+        let answer = ask(&mut regions);
+        self.graph = regions.into_graph();
+        answer
+    }
+
+    /// Regions in a copy of the graph.
+    pub fn regions(&self) -> Regions {
+        Regions::new(
+            self.graph.clone(),
+            self.values.clone(),
+            self.laws.discrete(),
+        )
+    }
+
+    /// Does an expression jump where a sign inside of it changes, or is it not seen to be continuous?
+    pub fn jumps(&self, node: NodeId) -> bool {
+        self.regions().jumps_at(node).is_some()
+    }
+
+    // ------------------------------------------------------------------ roots
+
+    fn note_root(&mut self, root: NodeId, argument: NodeId, of: Root) {
+        match self.roots.iter_mut().find(|known| known.0 == root) {
+            Some(known) => (known.1, known.2) = (argument, of),
+            None => self.roots.push((root, argument, of)),
+        }
+    }
+
+    fn root_of(&mut self, argument: NodeId, of: Root) -> NodeId {
+        match of {
+            Root::Square => self.unary(UnaryOp::Sqrt, argument),
+            Root::Power(power) => self.binary(BinaryOp::Pow, argument, power),
+            Root::Cube => self.unary(UnaryOp::Cbrt, argument),
+        }
+    }
+
+    /// A root, continued beyond the regions of the signs in its argument where needed.
+    fn root(&mut self, argument: NodeId, of: Root) -> NodeId {
+        let root = self.root_of(argument, of);
+        self.note_root(root, argument, of);
+        // A refusal of its pieces is that of a table: it has no signs.
+        let Ok(Some(pieces)) = self.pieces(argument, true) else {
+            return root;
+        };
+        if !has_known_signs_alone(&pieces) {
+            return root;
+        }
+        let positive = parts_of(&pieces).into_iter();
+        let mut parts: Vec<NodeId> = positive
+            .filter(|(_, sign)| *sign == filippov_expr::PartSign::Known(1.0))
+            .map(|(part, _)| part)
+            .collect();
+        parts.push(argument);
+        for inner in parts {
+            let inside = self.unary(UnaryOp::NotNegative, inner);
+            let continued = self.root_of(inside, of);
+            let root = self.root_of(inner, of);
+            match self.continued.iter_mut().find(|known| known.0 == root) {
+                Some(known) => known.1 = continued,
+                None => self.continued.push((root, continued)),
+            }
+        }
+        let continued = self.continued.iter().find(|known| known.0 == root);
+        match (continued, self.jumps(argument)) {
+            (Some(&(_, continued)), true) => continued,
+            _ => root,
+        }
+    }
+
+    /// A field whose cube roots switch with the sign of their argument: at zero they have no slope.
+    pub fn with_ends_of_roots(&mut self, field: Vec<NodeId>) -> Result<Vec<NodeId>, Refused> {
+        let below = self.graph.all_below(&field);
+        let roots = self.roots.clone().into_iter();
+        let mut images: Vec<(NodeId, NodeId)> = Vec::new();
+        for (root, argument, of) in roots.filter(|(root, ..)| below.binary_search(root).is_ok()) {
+            if !self.graph.depends_on_motion(argument) {
+                continue;
+            }
+            let argument = self.graph.substituted(argument, &images);
+            if let Root::Cube = of {
+                let absolute = self.absolute(argument)?;
+                let third = self.graph.constant(1.0 / 3.0);
+                let size = self.binary(BinaryOp::Pow, absolute, third);
+                let sign = self.sign(argument)?;
+                images.push((root, self.binary(BinaryOp::Mul, sign, size)));
+            }
+        }
+        if images.is_empty() {
+            return Ok(field);
+        }
+        let field = field.into_iter();
+        Ok(field
+            .map(|component| self.graph.substituted(component, &images))
+            .collect())
+    }
+
+    /// An expression as a switching function: with its roots continued, also inside of others.
+    pub fn as_surface(&mut self, node: NodeId) -> NodeId {
+        let mut node = node;
+        let images = self.continued.clone();
+        for _ in 0..images.len() {
+            let before = node;
+            node = self.graph.substituted(node, &images);
+            if node == before {
+                break;
+            }
+        }
+        node
+    }
+
+    fn switch_as_surface(&mut self, node: NodeId) {
+        let surface = self.as_surface(node);
+        if surface != node {
+            self.graph.switch_as(node, surface);
+        }
+    }
+
+    // ------------------------------------------------- what parameters decide
+
+    /// The sign of an expression of constants and parameters; `None` if it depends on the motion.
+    pub fn known_sign(&mut self, node: NodeId) -> Option<f64> {
+        let value = self.known_value(node)?;
+        self.is_pinned |= self.graph.as_constant(node).is_none();
+        Some(if value > 0.0 {
+            1.0
+        } else if value < 0.0 {
+            -1.0
+        } else {
+            value
+        })
+    }
+
+    /// The value of an expression of constants and parameters that is a whole number.
+    pub fn known_integer(&mut self, node: NodeId) -> Option<i64> {
+        let value = self.known_value(node)?;
+        if value.fract() != 0.0 || !value.is_finite() {
+            return None;
+        }
+        let bound = self.graph.constant(value);
+        let difference = self.binary(BinaryOp::Sub, node, bound);
+        self.known_sign(difference);
+        Some(value as i64)
+    }
+
+    /// The value of an expression of constants and parameters; `None` if it changes in a run.
+    pub fn known_value(&mut self, node: NodeId) -> Option<f64> {
+        let constant = self.graph.as_constant(node);
+        let changes = self.graph.depends_on_motion(node) || Laws::is_held(self, node);
+        if constant.is_some() || changes {
+            return constant;
+        }
+        let mut copy = self.graph.clone();
+        let values = (0..).zip(&self.values);
+        let images: Vec<(NodeId, NodeId)> = values
+            .map(|(index, &value)| (copy.parameter(index), copy.constant(value)))
+            .collect();
+        let value = copy.substituted(node, &images);
+        copy.as_constant(value)
+    }
+
+    /// Remembers a question.
+    pub fn ask(&mut self, node: NodeId, kind: Kind) {
+        let is_known = |known: &Question| known.node == node && known.kind == kind;
+        if !self.questions.iter().any(is_known) {
+            let place = self.place;
+            self.questions.push(Question { node, kind, place });
+        }
     }
 }

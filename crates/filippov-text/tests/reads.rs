@@ -73,19 +73,50 @@ fn what_is_not_read_has_a_place() {
         (refused.line, refused.column)
     };
     assert_eq!(
-        place("def f(t, x):\n    é = 1; return x[0] // 2\n"),
+        place("def f(t, x):\n    é = 1; return x[0] << 2\n"),
         (2, 19)
     );
-    assert_eq!(
-        place("def f(t, x):\n    while True:\n        pass\n"),
-        (2, 5)
-    );
+    assert_eq!(place("def f(t, x):\n    with x:\n        pass\n"), (2, 5));
     assert_eq!(place("def f(t, x, *rest):\n    return x\n"), (1, 13));
     assert_eq!(place(""), (1, 1));
 }
 
+const WHOLE: &str = "\
+import numpy as np
+import filippov as fl
+
+A = np.array([[0, 1], [-2, 0]])
+LEVELS = [1.0, 2.0, 4.0]
+
+
+def law(s, k=2.0):
+    return k * np.sign(s) if s > 0 else -k
+
+
+@fl.system(states=('y', 'v'), resets=fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.8 * x[1]]))
+def rhs(t, x, a=0.4):
+    q, *rest = [*x[:1], *(c * e for c, e in zip(LEVELS, x))]
+    force = np.floor(3 * x[1]) + np.interp(t, [0, 1, 2], LEVELS) - fl.hysteresis(q, -a, a)
+    return A @ x - np.array([0.0, 1.0]) * (force + law(x[1]) + sum(rest))
+";
+
+#[test]
+fn a_text_may_have_helpers_arrays_laws_and_resets() {
+    let model = read(WHOLE).unwrap();
+    assert_eq!(model.name, "rhs");
+    assert_eq!(model.system.definition.names.states, ["y", "v"]);
+    assert_eq!(model.system.actions.len(), 1);
+    assert!(model.system.definition.rules.laws.len() >= 3);
+}
+
 #[test]
 fn any_text_is_read_or_refused() {
+    for cut in (0..WHOLE.len()).filter(|&cut| WHOLE.is_char_boundary(cut)) {
+        let _ = read(&WHOLE[..cut]);
+        if let Ok(model) = read(&format!("{}[{}", &WHOLE[..cut], &WHOLE[cut..])) {
+            assert!(model.system.check().is_ok());
+        }
+    }
     for cut in (0..OSCILLATOR.len()).filter(|&cut| OSCILLATOR.is_char_boundary(cut)) {
         let _ = read(&OSCILLATOR[..cut]);
         let changed = format!("{}({}", &OSCILLATOR[..cut], &OSCILLATOR[cut..]);

@@ -1,6 +1,7 @@
 //! Equilibria and pseudo-equilibria in a window, by Newton's method from many starts.
 //!
-//! In a region f(x) = 0. On one surface ((1 - l) f- + (1 + l) f+) / 2 = 0 and h = 0, with the multiplier l as a further unknown.
+//! In a region f(x) = 0. On surfaces h_j = 0 the field is the mean of those around, with the weights (1 - l_j) / 2 and
+//! (1 + l_j) / 2 of the two sides of each, and the multipliers l_j are further unknowns.
 //! Derivatives are central differences: they decide how fast the iteration converges, not what it converges to.
 
 use filippov::cube::{is_stable, Matrix};
@@ -11,8 +12,8 @@ use crate::sheet::{Plane, SheetKind, SheetPart};
 /// An equilibrium.
 pub struct Equilibrium {
     pub y: Vec<f64>,
-    /// The surface that it is on, if it is a pseudo-equilibrium.
-    pub surface: Option<usize>,
+    /// The surfaces that it is on, if it is a pseudo-equilibrium.
+    pub surfaces: Vec<usize>,
     /// Is it stable? `None` if linear terms do not decide.
     pub is_stable: Option<bool>,
     /// Does the system have it: is it in its own region, or its multiplier from -1 to 1?
@@ -23,6 +24,8 @@ pub struct Equilibrium {
 const STARTS: usize = 7;
 const STARTS_ALONG: usize = 9;
 const MOST_ITERATIONS: usize = 40;
+/// Ends of parts of two surfaces that are nearer than this share of the window show where these meet.
+const NEAR_ENDS: f64 = 0.05;
 /// Equilibria nearer than this share of the window are one.
 const SAME: f64 = 1e-6;
 /// The last correction, relative to the size of the unknowns.
@@ -32,8 +35,8 @@ const UNDECIDED: f64 = 1e-6;
 /// Differences of the cube root of the rounding unit: the best for central ones.
 const STEP: f64 = 6e-6;
 
-/// The equilibria in the window: those of the regions seen there, and those on one surface each. A point on the border of its
-/// region is not among them: it is the end of sliding, or of sticking.
+/// The equilibria in the window: those of the regions seen there, those on one surface each, and those where two surfaces meet.
+/// A point on the border of its region is not among them: it is the end of sliding, or of sticking.
 pub fn equilibria(
     plane: &Plane,
     parts: &[SheetPart],
@@ -44,7 +47,7 @@ pub fn equilibria(
         let window = plane.window;
         let is_same = |known: &Equilibrium| {
             let is_near = window.distance(window.point(&known.y), window.point(&new.y)) <= SAME;
-            known.surface == new.surface && is_near && known.is_admissible == new.is_admissible
+            known.surfaces == new.surfaces && is_near && known.is_admissible == new.is_admissible
         };
         if window.contains(window.point(&new.y)) && !found.iter().any(is_same) {
             found.push(new);
@@ -66,7 +69,7 @@ pub fn equilibria(
         let balance = Balance {
             plane,
             signs,
-            surface: None,
+            surfaces: &[],
         };
         for x in &starts {
             let Some((x, jacobian)) = balance.solve(x.clone())? else {
@@ -80,7 +83,7 @@ pub fn equilibria(
             add(Equilibrium {
                 is_stable: stability(&jacobian),
                 is_admissible,
-                surface: None,
+                surfaces: Vec::new(),
                 y: x,
             });
         }
@@ -89,69 +92,138 @@ pub fn equilibria(
         let slides = matches!(part.kind, SheetKind::Attracting | SheetKind::Repelling);
         let stride = part.points.len().div_ceil(STARTS_ALONG);
         for start in part.points.iter().step_by(stride).filter(|_| slides) {
-            let mut x = plane.window.state(start.point);
-            let signs = plane.signs(&x)?;
-            let balance = Balance {
-                plane,
-                signs: &signs,
-                surface: Some(part.surface),
-            };
+            let x = plane.window.state(start.point);
             // The multiplier at which the motion slides.
-            x.push((start.minus + start.plus) / (start.minus - start.plus));
-            let Some((mut x, jacobian)) = balance.solve(x)? else {
-                continue;
-            };
-            let multiplier = x.pop().unwrap_or(f64::NAN);
-            let own = plane.signs(&x)?;
-            let others = (0..n_visible).filter(|&j| j != part.surface);
-            let is_admissible =
-                multiplier.abs() <= 1.0 && others.into_iter().all(|j| own[j] == signs[j]);
-            let is_stable = balance.sliding_stability(&x, multiplier, &jacobian)?;
-            add(Equilibrium {
-                is_stable,
-                is_admissible,
-                surface: Some(part.surface),
-                y: x,
-            });
+            let multiplier = (start.minus + start.plus) / (start.minus - start.plus);
+            let found = pseudo_equilibrium(plane, &[part.surface], x, &[multiplier], n_visible)?;
+            found.into_iter().for_each(&mut add);
+        }
+    }
+    for (surfaces, x) in meetings(plane, parts, n_visible)? {
+        let found = pseudo_equilibrium(plane, &surfaces, x, &[0.0; 2], n_visible)?;
+        found.into_iter().for_each(&mut add);
+    }
+    Ok(found)
+}
+
+/// The pseudo-equilibrium on these surfaces that Newton's method reaches from a state and multipliers.
+fn pseudo_equilibrium(
+    plane: &Plane,
+    surfaces: &[usize],
+    mut unknowns: Vec<f64>,
+    multipliers: &[f64],
+    n_visible: usize,
+) -> Result<Option<Equilibrium>, FieldError> {
+    let n = unknowns.len();
+    let signs = plane.signs(&unknowns)?;
+    let balance = Balance {
+        plane,
+        signs: &signs,
+        surfaces,
+    };
+    unknowns.extend(multipliers);
+    let Some((mut x, jacobian)) = balance.solve(unknowns)? else {
+        return Ok(None);
+    };
+    let multipliers = x.split_off(n);
+    let own = plane.signs(&x)?;
+    let others = (0..n_visible).filter(|j| !surfaces.contains(j));
+    let is_inside = multipliers.iter().all(|multiplier| multiplier.abs() <= 1.0);
+    Ok(Some(Equilibrium {
+        is_stable: sliding_stability(n, &jacobian),
+        is_admissible: is_inside && others.into_iter().all(|j| own[j] == signs[j]),
+        surfaces: surfaces.to_vec(),
+        y: x,
+    }))
+}
+
+/// Two surfaces, and a state near which they meet.
+type Meeting = (Vec<usize>, Vec<f64>);
+
+/// Where two surfaces meet in the window, as far as the ends of their pieces show it; in more than two states also starts along
+/// each surface, for the other states are not those of the window there.
+fn meetings(
+    plane: &Plane,
+    parts: &[SheetPart],
+    n_visible: usize,
+) -> Result<Vec<Meeting>, FieldError> {
+    let mut found = Vec::new();
+    for part in parts {
+        let stride = part.points.len().div_ceil(STARTS_ALONG);
+        let mut before: Option<Vec<f64>> = None;
+        for (index, point) in part.points.iter().enumerate() {
+            let x = plane.window.state(point.point);
+            let signs = plane.signs(&x)?;
+            let is_start = x.len() > 2 && index % stride == 0;
+            for other in part.surface + 1..n_visible {
+                let crosses = before
+                    .as_ref()
+                    .is_some_and(|before| before[other] != signs[other]);
+                if crosses || is_start {
+                    found.push((vec![part.surface, other], x.clone()));
+                }
+            }
+            before = Some(signs);
+        }
+    }
+    // Parts of one surface end where the fields beside it change, as they do at another surface.
+    for (k, part) in parts.iter().enumerate() {
+        for other in parts[k + 1..]
+            .iter()
+            .filter(|other| other.surface != part.surface)
+        {
+            let pair = vec![
+                part.surface.min(other.surface),
+                part.surface.max(other.surface),
+            ];
+            let ends =
+                |part: &SheetPart| [part.points.first().copied(), part.points.last().copied()];
+            for a in ends(part).into_iter().flatten() {
+                for b in ends(other).into_iter().flatten() {
+                    if plane.window.distance(a.point, b.point) <= NEAR_ENDS {
+                        found.push((pair.clone(), plane.window.state(a.point)));
+                    }
+                }
+            }
         }
     }
     Ok(found)
 }
 
-/// The equations of an equilibrium in a region, or on a surface with its multiplier as the last unknown.
+/// The equations of an equilibrium in a region, or on surfaces with their multipliers as the last unknowns.
 struct Balance<'a> {
     plane: &'a Plane<'a>,
     signs: &'a [f64],
-    surface: Option<usize>,
+    surfaces: &'a [usize],
 }
 
 impl Balance<'_> {
-    /// The field, and on a surface its function behind it.
+    /// The field, and on surfaces their functions behind it.
     fn residual(&self, unknowns: &[f64]) -> Result<Vec<f64>, FieldError> {
         let Plane { system, t, q, .. } = *self.plane;
         let n = system.n_states();
-        let (x, multiplier) = unknowns.split_at(n);
-        let field_at = |signs: &[f64]| {
-            let mut dx = vec![0.0; n];
-            let setting = Setting::new(signs, q);
-            system.field(&setting.at(t, x), &mut dx).map(|()| dx)
-        };
-        let (Some(j), &[l]) = (self.surface, multiplier) else {
-            return field_at(self.signs);
-        };
+        let (x, multipliers) = unknowns.split_at(n);
         let mut signs = self.signs.to_vec();
-        signs[j] = -1.0;
-        let minus = field_at(&signs)?;
-        signs[j] = 1.0;
-        let plus = field_at(&signs)?;
-        let both = minus.iter().zip(&plus);
-        let mut residual: Vec<f64> = both
-            .map(|(minus, plus)| 0.5 * ((1.0 - l) * minus + (1.0 + l) * plus))
-            .collect();
-        let mut h = vec![0.0; signs.len()];
-        let setting = Setting::new(&signs, q);
-        system.surfaces(&setting.at(t, x), &mut h)?;
-        residual.push(h[j]);
+        let mut residual = vec![0.0; n];
+        let mut dx = vec![0.0; n];
+        for corner in 0..1_usize << self.surfaces.len() {
+            let mut weight = 1.0;
+            for (bit, (&j, l)) in self.surfaces.iter().zip(multipliers).enumerate() {
+                signs[j] = if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                weight *= 0.5 * (1.0 + signs[j] * l);
+            }
+            let setting = Setting::new(&signs, q);
+            system.field(&setting.at(t, x), &mut dx)?;
+            for (sum, part) in residual.iter_mut().zip(&dx) {
+                *sum += weight * part;
+            }
+        }
+        if !self.surfaces.is_empty() {
+            let mut h = vec![0.0; signs.len()];
+            let setting = Setting::new(&signs, q);
+            system.surfaces(&setting.at(t, x), &mut h)?;
+            residual.extend(self.surfaces.iter().map(|&j| h[j]));
+        }
         Ok(residual)
     }
 
@@ -201,50 +273,72 @@ impl Balance<'_> {
         }
         Ok(None)
     }
+}
 
-    /// Is the equilibrium of the sliding field stable? The surface must attract, and the field on it too.
-    fn sliding_stability(
-        &self,
-        x: &[f64],
-        multiplier: f64,
-        jacobian: &Matrix,
-    ) -> Result<Option<bool>, FieldError> {
-        let n = x.len();
-        // Rows: the field by states and multiplier, then the gradient of h.
-        let entry = |i: usize, k: usize| jacobian[(i, k)];
-        let normal: f64 = (0..n).map(|i| entry(n, i) * entry(i, n)).sum();
-        if normal == 0.0 || !multiplier.is_finite() {
-            return Ok(None);
-        }
-        // dh/dt = normal * (l - l0): the surface attracts if it falls with the multiplier.
-        if normal > 0.0 {
-            return Ok(Some(false));
-        }
-        if n == 1 {
-            return Ok(Some(true));
-        }
-        // The multiplier keeps the rate of h at zero: l_x = -(h_x F_x) / (h_x F_l).
-        let response = |k: usize| {
-            let rate: f64 = (0..n).map(|i| entry(n, i) * entry(i, k)).sum();
-            -rate / normal
-        };
-        let responses: Vec<f64> = (0..n).map(response).collect();
-        let along = |i: usize, k: usize| entry(i, k) + entry(i, n) * responses[k];
-        // On the surface the state with the steepest slope follows from the others.
-        let steepest = (0..n).fold(0, |best, i| {
-            if entry(n, i).abs() > entry(n, best).abs() {
-                i
-            } else {
-                best
-            }
-        });
-        let others: Vec<usize> = (0..n).filter(|&i| i != steepest).collect();
-        let reduced = Matrix::of(n - 1, |i, k| {
-            let (i, k) = (others[i], others[k]);
-            along(i, k) - along(i, steepest) * entry(n, k) / entry(n, steepest)
-        });
-        Ok(stability(&reduced))
+/// Is the equilibrium of a sliding field stable? The surfaces must attract, and the field on them too.
+///
+/// The rows of the derivative are the field by states and multipliers, then the gradients of the surfaces.
+fn sliding_stability(n: usize, jacobian: &Matrix) -> Option<bool> {
+    let m = jacobian.n() - n;
+    let entry = |i: usize, k: usize| jacobian[(i, k)];
+    let rate = |j: usize, k: usize| -> f64 { (0..n).map(|i| entry(n + j, i) * entry(i, k)).sum() };
+    // dh/dt = normal * (l - l0): the surfaces attract if it falls with the multipliers.
+    let normal = Matrix::of(m, |j, k| rate(j, n + k));
+    match stability(&normal) {
+        Some(true) if n > m => {}
+        decided => return decided,
     }
+    // The multipliers keep the rates of h at zero: their derivative by the states, one column for each.
+    let columns: Option<Vec<Vec<f64>>> = (0..n)
+        .map(|k| {
+            let rates: Vec<f64> = (0..m).map(|j| -rate(j, k)).collect();
+            normal.solve(&rates).map(|column| column.to_vec())
+        })
+        .collect();
+    let responses = columns?;
+    let along = |i: usize, k: usize| {
+        entry(i, k)
+            + (0..m)
+                .map(|j| entry(i, n + j) * responses[k][j])
+                .sum::<f64>()
+    };
+    // On the surfaces m of the states follow from the others: those in which the surfaces are steepest.
+    let dependent = steepest(n, m, &entry);
+    let others: Vec<usize> = (0..n).filter(|i| !dependent.contains(i)).collect();
+    let gradient = Matrix::of(m, |j, p| entry(n + j, dependent[p]));
+    let follow: Option<Vec<Vec<f64>>> = others
+        .iter()
+        .map(|&k| {
+            let slopes: Vec<f64> = (0..m).map(|j| -entry(n + j, k)).collect();
+            gradient.solve(&slopes).map(|column| column.to_vec())
+        })
+        .collect();
+    let follow = follow?;
+    let reduced = Matrix::of(n - m, |i, k| {
+        let through = (0..m).map(|p| along(others[i], dependent[p]) * follow[k][p]);
+        along(others[i], others[k]) + through.sum::<f64>()
+    });
+    stability(&reduced)
+}
+
+/// The states, one or two, in which the gradients of as many surfaces have the largest determinant.
+fn steepest(n: usize, m: usize, entry: &dyn Fn(usize, usize) -> f64) -> Vec<usize> {
+    let size = |columns: &[usize]| match columns {
+        [a] => entry(n, *a).abs(),
+        [a, b] => (entry(n, *a) * entry(n + 1, *b) - entry(n, *b) * entry(n + 1, *a)).abs(),
+        _ => 0.0,
+    };
+    let single = (0..n).map(|a| vec![a]);
+    let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| vec![a, b]));
+    let candidates: Vec<Vec<usize>> = match m {
+        1 => single.collect(),
+        _ => pairs.collect(),
+    };
+    let larger = |best: Vec<usize>, other: Vec<usize>| match size(&other) > size(&best) {
+        true => other,
+        false => best,
+    };
+    candidates.into_iter().reduce(larger).unwrap_or_default()
 }
 
 /// Do all eigenvalues have negative real parts? `None` if one is too near to the imaginary axis.

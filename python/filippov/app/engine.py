@@ -26,7 +26,7 @@ __all__ = ["Engine"]
 
 Array = npt.NDArray[np.float64]
 
-_CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "basins", "sample")
+_CORE_KINDS = ("describe", "run", "section", "diagram", "portrait", "ends", "basins", "sample")
 _MOST_POINTS = 300
 _SAMPLES = 401  # of a cycle, for its extent: to 3e-5 of the amplitude of a sine
 _LOG = logging.getLogger(__name__)
@@ -158,7 +158,7 @@ class Engine:
         of = given.get("of", "cycle")
         start: State
         if of == "cycle":
-            start = self._to_follow(given)
+            start = self._found_cycle(given)
         elif of == "equilibrium":
             start = equilibrium(self.page.system, self._start(given), self._params(given))
         else:
@@ -171,18 +171,6 @@ class Engine:
         period = None if given.get("period") is None else _number(given, "period", 0.0)
         t0 = _number(given, "t0", self._span(given)[0])
         return limit_cycle(self.page.system, self._start(given), self._params(given), period=period, t0=t0)
-
-    def _to_follow(self, given: Mapping[str, Any]) -> Cycle:
-        """Return the cycle that a branch starts with.
-
-        At a late time the phase of a forcing turns fast with its frequency: a branch would have tiny steps.
-        """
-        found = self._found_cycle(given)
-        if not found.is_forced:
-            return found
-        period = None if given.get("period") is None else found.period
-        options: dict[str, Any] = {"period": period, "t0": 0.0, "transient": 0}
-        return limit_cycle(self.page.system, found.at(0.0), found.params, **options)
 
     def _start(self, given: Mapping[str, Any]) -> list[float]:
         if given.get("y0") is None:

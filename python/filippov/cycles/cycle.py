@@ -195,6 +195,18 @@ class Cycle:
         shooting = self._shooting
         return cycle_at(shooting.motions, *self.inside(), self.period, shooting.period)
 
+    def in_first_period(self) -> Cycle:
+        """Return the same cycle of a forced system, begun in the first period from time 0.
+
+        A branch keeps the phase of the forcing at the start. Late in time the start moves far with the
+        frequency.
+        """
+        shooting, itinerary = self._shooting, self.itinerary
+        start = itinerary.t0 % self.period
+        if shooting.period is None or start == itinerary.t0:
+            return self
+        return cycle_of(shooting.motions, itinerary.from_time(start), shooting.period)
+
     def inside(self) -> tuple[float, Array]:
         """Return a time and the state then in the middle of a piece, a long one that loses few dimensions.
 

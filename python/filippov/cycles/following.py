@@ -149,7 +149,7 @@ def continuation(
             f"start: a cycle, an equilibrium or a special point is needed, not {type(start).__name__}"
         )
     if isinstance(first, Cycle):
-        first = first.from_event()
+        first = first.from_event().in_first_period()
     if store is not None and not Path(store).parent.is_dir():
         raise InputError(f"store: there is no folder {Path(store).parent}")
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)

@@ -89,7 +89,7 @@ class Itinerary(NamedTuple):
         return float(sum(self.durations))
 
     def from_time(self, t0: float) -> Itinerary:
-        """Return the same cycle of a system that does not depend on the time, from another time."""
+        """Return the itinerary from another time: of a system without forcing, or moved by periods of it."""
         shift = t0 - self.t0
         legs = [
             leg

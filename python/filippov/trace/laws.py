@@ -284,8 +284,8 @@ class Laws:
         if read is not None:
             # The entry at an entry is that of a list of its own.
             place, through = read
-            first = int(through.numbers[0])
             entries = tuple(entries[int(at) - first] for at in through.numbers[1:])
+            first = int(through.numbers[0])
         law = _Law("entry", (place,), (float(first), *map(float, entries)))
         node = self._state(tracer, law, name or f"entry({tracer.text(place)})")
         if law.values == "whole":

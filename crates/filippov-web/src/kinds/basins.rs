@@ -1,4 +1,8 @@
 //! Basins: where motions from a window of starts are at the end of their span.
+//!
+//! The ends of some rows of cells are a request of their own, so that several engines can share the work; one of them groups all.
+
+use std::ops::Range;
 
 use filippov::{Keep, Problem};
 
@@ -16,32 +20,42 @@ const MAX_STEPS: u64 = 20_000;
 /// Ends that differ by at most this share of their extent, in every state, are one; and this share of the window's sides at least.
 const NEAR: f64 = 0.02;
 
+/// The states at the end of the motions from the cells of some rows, `rows: [first, last)`: NaN where the run failed.
+pub fn ends(model: &Model, request: &Request) -> Result<Reply, Refusal> {
+    let window = Window::read(model, request, CELLS)?;
+    let cells = window.cells;
+    let rows = request.exactly::<2>("rows")?.unwrap_or([0.0, cells as f64]);
+    let is_row = |row: &f64| row.fract() == 0.0 && (0.0..=cells as f64).contains(row);
+    if !rows.iter().all(is_row) || rows[0] >= rows[1] {
+        let requirement = format!("[first, last) with whole numbers from 0 to {cells} is needed");
+        return Err(request.wrong("rows", &requirement));
+    }
+    let rows = rows.map(|row| row as usize);
+    let ends = ends_of(model, request, &window, rows[0]..rows[1])?;
+    let failed = || vec![f64::NAN; model.n()];
+    let values: Vec<f64> = ends
+        .iter()
+        .flat_map(|end| end.clone().unwrap_or_else(failed))
+        .collect();
+    let mut reply = Reply::new("ends");
+    reply.array("end", &[ends.len(), model.n()], &values);
+    Ok(reply)
+}
+
+/// The groups of the ends of all cells: of those in `ends`, one state after another with `null` where a run failed, or else of
+/// motions that are computed here.
 pub fn basins(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     let window = Window::read(model, request, CELLS)?;
-    let mut wanted = RunRequest::read(model, request, Keep::Last)?;
-    if request.get("max_steps").is_none() {
-        wanted.options.max_steps = MAX_STEPS;
-    }
     let n = model.n();
+    let cells = window.cells;
     let (targets, is_given) = match request.get("targets") {
         Some(_) => (targets_of(model, request)?, true),
         None => (Vec::new(), false),
     };
-    let cells = window.cells;
-    let mut ends: Vec<Option<Vec<f64>>> = Vec::with_capacity(cells * cells);
-    for row in 0..cells {
-        for column in 0..cells {
-            let start = window.state(window.centre(column, row, cells));
-            let ready = model.ready(&wanted.params, wanted.t_span.0, &start)?;
-            let actions = ready.actions();
-            let solution = Problem::new(ready.system(), wanted.t_span, &start)
-                .options(&wanted.options)
-                .actions(&actions)
-                .solve()?;
-            let is_good = solution.stop.is_success();
-            ends.push(is_good.then(|| solution.last_state().to_vec()));
-        }
-    }
+    let ends = match request.get("ends") {
+        Some(_) => given_ends(request, cells * cells, n)?,
+        None => ends_of(model, request, &window, 0..cells)?,
+    };
     let good: Vec<Vec<f64>> = ends.iter().flatten().cloned().collect();
     let reach = reach_of(&window, &good, n);
     let (groups, names) = match is_given {
@@ -78,6 +92,46 @@ pub fn basins(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     reply.set("failed", ends.iter().filter(|end| end.is_none()).count());
     reply.array("label", &[cells, cells], &labels);
     Ok(reply)
+}
+
+fn ends_of(
+    model: &Model,
+    request: &Request,
+    window: &Window,
+    rows: Range<usize>,
+) -> Result<Vec<Option<Vec<f64>>>, Refusal> {
+    let mut wanted = RunRequest::read(model, request, Keep::Last)?;
+    if request.get("max_steps").is_none() {
+        wanted.options.max_steps = MAX_STEPS;
+    }
+    let mut ends = Vec::with_capacity(rows.len() * window.cells);
+    for row in rows {
+        for column in 0..window.cells {
+            let start = window.state(window.centre(column, row, window.cells));
+            let ready = model.ready(&wanted.params, wanted.t_span.0, &start)?;
+            let actions = ready.actions();
+            let solution = Problem::new(ready.system(), wanted.t_span, &start)
+                .options(&wanted.options)
+                .actions(&actions)
+                .solve()?;
+            let is_good = solution.stop.is_success();
+            ends.push(is_good.then(|| solution.last_state().to_vec()));
+        }
+    }
+    Ok(ends)
+}
+
+fn given_ends(request: &Request, count: usize, n: usize) -> Result<Vec<Option<Vec<f64>>>, Refusal> {
+    let requirement = format!("a list of {count} states with {n} numbers each is needed");
+    let wrong = || request.wrong("ends", &requirement);
+    let list = request.get("ends").and_then(|value| value.as_array());
+    let list = list
+        .filter(|list| list.len() == count * n)
+        .ok_or_else(wrong)?;
+    let states = list
+        .chunks(n)
+        .map(|state| state.iter().map(serde_json::Value::as_f64).collect());
+    Ok(states.collect())
 }
 
 /// Two ends that differ by this in every state count as neighbours.

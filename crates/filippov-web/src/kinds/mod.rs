@@ -16,12 +16,13 @@ use crate::request::Request;
 type Answerer = fn(&Model, &Request) -> Result<Reply, Refusal>;
 
 /// All kinds by name.
-pub const ALL: [(&str, Answerer); 7] = [
+pub const ALL: [(&str, Answerer); 8] = [
     ("describe", describe::describe),
     ("run", run::run),
     ("sample", sample::sample),
     ("section", section::section),
     ("diagram", diagram::diagram),
     ("portrait", portrait::portrait),
+    ("ends", basins::ends),
     ("basins", basins::basins),
 ];

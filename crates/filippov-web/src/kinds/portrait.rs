@@ -16,6 +16,10 @@ const CELLS: usize = 64;
 const ARROWS: u64 = 20;
 const MOST_ARROWS: u64 = 200;
 
+/// What is looked for, in words.
+const SEARCHED: &str = "Equilibria were looked for by Newton's method from many starts: in the regions seen here, on each surface, \
+    and where two surfaces meet. There may be others.";
+
 pub fn portrait(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     if model.n() < 2 {
         return Err(Refusal::request("portrait: the model has one state only"));
@@ -65,14 +69,15 @@ pub fn portrait(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         false => equilibria(&plane, &sheets, model.n_visible())?,
     };
     let resting = resting.iter().map(|point| {
-        let surfaces = point.surface.map(|j| model.surface(j));
+        let surfaces = point.surfaces.iter().map(|&j| model.surface(j));
         json!({
             "y": point.y,
-            "surfaces": surfaces.into_iter().collect::<Vec<_>>(),
+            "surfaces": surfaces.collect::<Vec<_>>(),
             "stable": point.is_stable,
             "admissible": point.is_admissible,
         })
     });
+    reply.set("searched", SEARCHED);
     reply.set("equilibria", resting.collect::<Vec<Value>>());
     reply.set("parts", parts);
     reply.array("points", &[points.len() / 2, 2], &points);
