@@ -139,7 +139,7 @@ def main(path: Path) -> None:
     assert solution.y[:, -1].tolist() == [0.0, 0.0]
 
     figure, (top, bottom) = pyplot.subplots(2, 1, figsize=(8.4, 6.0), layout="constrained", sharex=True)
-    top.plot(TABLE_T, TABLE_A, linewidth=0.7, color="0.3")
+    top.plot(TABLE_T, TABLE_A, linewidth=0.7, color="0.4")
     limit = GRAVITY * math.tan(ALPHA)
     for value in (limit, -limit):
         top.axhline(value, color="tab:red", linewidth=0.8, linestyle="--")
