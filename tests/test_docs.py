@@ -102,6 +102,27 @@ def test_the_reference_names_the_functions_of_numpy() -> None:
     assert [name for name in fnp.__all__ if f"`{name}`" not in page] == []
 
 
+def test_the_page_of_options_names_arguments_and_values_that_there_are() -> None:
+    import inspect
+
+    import filippov as fl
+    from filippov.options import _METHODS, _POLICIES
+    from filippov.sliding_policy import _RULES
+
+    text = (DOCS / "options.md").read_text(encoding="utf-8")
+    takers = (fl.solve_ivp, fl.System, fl.System.solve, fl.Reset, fl.SlidingPolicy)
+    arguments = {name for taker in takers for name in inspect.signature(taker).parameters}
+    named = set(re.findall(r"\b([a-z_]+)=", text.replace("dt", "")))
+    assert sorted(named - arguments) == []
+    functions = set(re.findall(r"`fl\.(\w+)", text))
+    assert sorted(name for name in functions if not hasattr(fl, name)) == []
+    values = set(re.findall(r'"([\w-]+)"', text))
+    known = {*_METHODS, *_RULES, *(value for choices in _POLICIES.values() for value in choices)}
+    assert sorted(values - known) == []
+    needs_no_choice = {"RK45", "canopy"}  # SciPy's name for DOPRI5, and a default
+    assert sorted(known - values - needs_no_choice) == []
+
+
 def test_every_code_of_a_special_point_is_explained() -> None:
     from filippov.cycles.branch import CODES
 
