@@ -31,6 +31,10 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from docs_notebooks import notebook  # noqa: E402
 
 CACHE = ROOT / "target" / "docs-cache"
+BLOCKS = ROOT / "scripts" / "readme_blocks.py"
+DRAWN_TWICE = ROOT / "scripts" / "dark_figures.py"
+# A picture has a name for a light page, and one for a dark one.
+GROUNDS = {"": "light", ".dark": "dark"}
 TEXT_ONLY = os.environ.get("FILIPPOV_DOCS") == "text"
 EXAMPLES = ROOT / "examples"
 RUN_FOLDERS = ("tutorial", "howto", "compare")
@@ -65,7 +69,8 @@ DARK = {
     "#bbbbbb": "#56606a",
     "#0072b2": "#56b4e9",
 }
-_PICTURE = re.compile(r"(!\[[^]]*\]\()([^)/]*\.png)(?=\))")
+# A picture that code draws: the page's own, or the one of an example.
+_PICTURE = re.compile(r"!\[(?P<text>[^]]*)\]\((?P<name>[^)/]*)\.png\)")
 _BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -108,7 +113,9 @@ def on_page_markdown(markdown: str, page: Any, files: Any, **_: Any) -> str:
         link = f"[Download this page as a notebook]({_notebook_name(Path(here).stem)}){{ .md-button }}"
         markdown = f"{markdown.rstrip()}\n\n{link}\n"
     if here in RUN_PAGES or here.startswith(tuple(f"{folder}/" for folder in RUN_FOLDERS)):
-        markdown = _PICTURE.sub(lambda match: match[1] + _picture_name(Path(here).stem, match[2]), markdown)
+        markdown = _PICTURE.sub(
+            lambda match: _in_both(match["text"], f"{Path(here).stem}.{match['name']}"), markdown
+        )
     markdown = _FIGURE.sub(_figure, markdown)
     original = {target: ROOT / name for name, target in FROM_ROOT.items()}.get(here, ROOT / "docs" / here)
 
@@ -166,9 +173,7 @@ def _state_of_the_package() -> str:
     """Return a digest of all that an example or a page may use: sources of the package, and the core."""
     found = hashlib.sha256()
     package = ROOT / "python" / "filippov"
-    for path in sorted(
-        [*package.rglob("*.py"), *package.glob("_core*"), ROOT / "scripts" / "readme_blocks.py"]
-    ):
+    for path in sorted([*package.rglob("*.py"), *package.glob("_core*"), BLOCKS, DRAWN_TWICE]):
         found.update(path.read_bytes())
     return found.hexdigest()
 
@@ -190,13 +195,17 @@ def _produced(job: Path, docs: Path) -> dict[str, str | bytes]:
     made = _made(job)
     if job.suffix == ".py":
         page = _example_page(job, made.pop("printed.txt", b"(not run)").decode())
-        return {
-            f"gallery/{job.stem}.md": page,
-            f"gallery/{job.stem}.png": made.get(f"{job.stem}.png", _BLANK),
-        }
-    shown = _PICTURE.findall(job.read_text(encoding="utf-8"))
+        names = [f"{job.stem}{suffix}.png" for suffix in GROUNDS]
+        pictures = {f"gallery/{name}": made.get(name, _BLANK) for name in names}
+        return {f"gallery/{job.stem}.md": page, **pictures}
+    shown = [match["name"] for match in _PICTURE.finditer(job.read_text(encoding="utf-8"))]
+    # Two pages of a folder may draw pictures of the same name.
     beside = job.parent.relative_to(docs)
-    return {(beside / _picture_name(job.stem, name)).as_posix(): made.get(name, _BLANK) for _, name in shown}
+    return {
+        (beside / f"{job.stem}.{name}{suffix}.png").as_posix(): made.get(f"{name}{suffix}.png", _BLANK)
+        for name in shown
+        for suffix in GROUNDS
+    }
 
 
 def _made(job: Path) -> dict[str, bytes]:
@@ -208,17 +217,17 @@ def _made(job: Path) -> dict[str, bytes]:
         shutil.rmtree(kept, ignore_errors=True)
         (kept / "made").mkdir(parents=True)
         if job.suffix == ".py":
-            printed = _run([str(job), str(kept / "made" / f"{job.stem}.png")], job)
+            printed = _run([str(DRAWN_TWICE), str(job), str(kept / "made" / f"{job.stem}.png")], job)
             (kept / "made" / "printed.txt").write_text(printed, encoding="utf-8")
         else:
-            _run([str(ROOT / "scripts" / "readme_blocks.py"), str(job), str(kept / "made")], job)
+            _run([str(DRAWN_TWICE), str(BLOCKS), str(job), str(kept / "made")], job)
         mark.write_text(key)
     return {path.name: path.read_bytes() for path in sorted((kept / "made").glob("*.*"))}
 
 
-def _picture_name(stem: str, name: str) -> str:
-    """Return the name of a picture on the site: two pages of a folder may draw pictures of the same name."""
-    return f"{stem}.{name}"
+def _in_both(text: str, name: str, ending: str = "png") -> str:
+    """Return a picture that has another file for dark pages."""
+    return "".join(f"![{text}]({name}{suffix}.{ending}#only-{ground})" for suffix, ground in GROUNDS.items())
 
 
 def _words(script: Path) -> list[str]:
@@ -233,7 +242,7 @@ def _title(script: Path) -> str:
 def _example_page(script: Path, printed: str) -> str:
     title, *rest = _words(script)
     code = script.read_text(encoding="utf-8").split('"""', 2)[2].strip()
-    parts = [f"# {_title(script)}", title, *rest, f"![{_title(script)}]({script.stem}.png)"]
+    parts = [f"# {_title(script)}", title, *rest, _in_both(_title(script), script.stem)]
     parts += [f"[Download the script]({script.name}){{ .md-button }}"]
     parts += ["## The numbers", f"```text\n{printed.rstrip()}\n```", "## The code", f"```python\n{code}\n```"]
     for module in _problem_modules(code):
@@ -277,8 +286,12 @@ def _add_gallery(files: Any, config: Any, scripts: dict[str, Path]) -> None:
 
 def _card(script: Path) -> str:
     title, *_ = _words(script)
+    pictures = "".join(
+        f'<img src="{script.stem}{suffix}.png#only-{ground}" alt="" loading="lazy">'
+        for suffix, ground in GROUNDS.items()
+    )
     return (
-        f'<a href="{script.stem}.html"><img src="{script.stem}.png" alt="" loading="lazy">'
+        f'<a href="{script.stem}.html">{pictures}'
         f"<b>{_title(script)}</b><span>{' '.join(title.split())}</span></a>"
     )
 
@@ -290,10 +303,7 @@ def _notebook_name(stem: str) -> str:
 def _figure(match: re.Match[str]) -> str:
     """Return a figure of the project in both colours, with its caption."""
     alternative = re.sub(r"[$\\{}*`]", "", match["caption"])
-    pictures = "".join(
-        f"![{alternative}]({match['source']}{suffix}.svg#only-{ground})"
-        for suffix, ground in (("", "light"), (".dark", "dark"))
-    )
+    pictures = _in_both(alternative, match["source"], "svg")
     caption = f"<figcaption>{match['caption']}</figcaption>"
     return f'<figure class="drawn" markdown="span">\n{pictures}\n{caption}\n</figure>'
 

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "theory" / "figures"
 INK, GREY, PALE, GROUND = "#000000", "#555555", "#bbbbbb", "#ffffff"
-BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
+BLUE, ORANGE, GREEN, BRIGHT_BLUE = "#0072b2", "#d55e00", "#009e73", "#2f8fcf"
 STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "filippov",
@@ -557,7 +557,8 @@ def home() -> Figure:
         system, fl.Phase(400e-6), (0, np.inf), [12.0, 0.55], {"E": voltages}, n=250, transient=400
     )
     table = fl.analysis.expand_returns(data, "v").to_dataframe()
-    right.plot(table["E"], table["v"], ".", color=BLUE, ms=1.8, alpha=0.8, mew=0, rasterized=True)
+    # Dots that become a picture are not recoloured: this blue is seen on both grounds.
+    right.plot(table["E"], table["v"], ".", color=BRIGHT_BLUE, ms=1.8, alpha=0.8, mew=0, rasterized=True)
     right.set(xlabel="input voltage", ylabel="output voltage, once per period")
     right.set_title("a converter doubles its period, up to chaos", fontsize=10)
     return figure

@@ -56,7 +56,10 @@ def test_pictures(model: Path, more: list[str]) -> None:
 
 def test_a_failed_run_keeps_what_it_has(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["solve", "model.py", "--t", "50", "--max-steps", "3", "--csv", "out.csv"]) == 1
-    assert "max_steps was reached" in capsys.readouterr().err
+    shown = capsys.readouterr()
+    assert shown.err.count("max_steps was reached") == 1
+    assert "max_steps" not in shown.out  # the reason is printed once
+    assert "run:        not complete" in shown.out
     assert len(rows(model.parent / "out.csv")) > 1
 
 

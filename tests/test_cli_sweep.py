@@ -46,6 +46,23 @@ def test_ends_over_initial_states(model: Path) -> None:
     ]
 
 
+def test_two_swept_states_are_drawn_as_basins(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    wells = "import filippov as fl\n@fl.system(states=('x', 'v'))\ndef wells(t, s, d=0.2):\n"
+    model.write_text(wells + "    return s[1], s[0] - s[0] ** 3 - d * s[1]\n")
+    grid = ["--y0", "x=-2:2:4", "v=-2:2:4", "--t", "300"]
+    assert main(["sweep", "model.py", *grid, "--plot", "out.png", "--csv", "out.csv"]) == 0
+    names: dict[str, fl.System] = {}
+    exec(model.read_text(), names)
+    axis = np.linspace(-2, 2, 4)
+    expected = fl.basins(names["wells"], None, (0, 300), {"x": axis, "v": axis})
+    assert [
+        int(row["attractor"]) for row in rows(Path("out.csv"))
+    ] == expected.attractor.values.ravel().tolist()
+    assert Path("out.png").read_bytes().startswith(b"\x89PNG")
+    assert "basins:   2 attractors; shares of the points: 0: 0.5, 1: 0.5" in capsys.readouterr().out
+
+
 def test_a_section_of_the_file_and_failed_points(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model.write_text(MODEL + "section = fl.Section(lambda t, x: x[0], direction='up')\nt_span = (0, 50)\n")
     assert main(["sweep", "model.py", "--param", "F=0.2,1e400", "--quiet"]) == 1
@@ -90,6 +107,10 @@ def test_a_killed_sweep_goes_on(model: Path) -> None:
         (["--param", "omega=1,2", "--section", "w", "--t", "9"], "w"),
         (["--param", "omega=1,2"], "--t: the end is needed"),
         (["--param", "omega=1,2", "--t", "9", "--plot", "o.png"], "--plot: one parameter with several"),
+        (
+            ["--y0", "y=0,1", "v=0,1", "--t", "9", "--plot", "o.png", "--state", "v"],
+            "--state: needs --plot over one parameter",
+        ),
         (["--param", "omega=1,2", "--t", "9", "--y0", "0:1:3", "1"], "--y0: ranges need names"),
         (["--param", "omega=1,2", "--t", "9", "--y0", "z=0:1:3"], "--y0: no 'z'; there are y, v"),
         (

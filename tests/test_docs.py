@@ -37,6 +37,36 @@ def test_the_code_of_a_page_runs_and_prints_what_stands_there(
     assert drawn == shown
 
 
+def test_a_figure_is_saved_in_the_colours_of_a_dark_page_too(tmp_path: Path) -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    from dark_figures import PAGE, saved_twice
+    from filippov.plot.style import DARK, LIGHT
+    from matplotlib.colors import to_rgb
+
+    def of(name: str) -> tuple[set[tuple[int, ...]], tuple[int, ...]]:
+        pixels = (pyplot.imread(tmp_path / name)[:, :, :3] * 255).round().astype(int)
+        return {tuple(pixel) for row in pixels.tolist() for pixel in row}, tuple(pixels[0, 0].tolist())
+
+    def level(colour: str) -> tuple[int, ...]:
+        return tuple(round(255 * part) for part in to_rgb(colour))
+
+    for is_dark in (False, True):
+        figure, ax = pyplot.subplots(figsize=(2, 2), facecolor=DARK.ground if is_dark else "white")
+        ax.set(facecolor=figure.get_facecolor(), xticks=[], yticks=[])
+        chosen = DARK if is_dark else LIGHT
+        ax.fill_between([0, 1], 0, 1, color=chosen.colours[0], linewidth=0)  # a collection
+        ax.barh([1.5], [1], color=chosen.colours[5])  # a path
+        ax.pcolormesh([0, 1], [3, 4], [[0.0]], cmap="viridis")  # neither grey nor of the theme: kept
+        with saved_twice():
+            figure.savefig(tmp_path / "drawn.png")
+        pyplot.close(figure)
+        (light, ground), (dark, dark_ground) = of("drawn.png"), of("drawn.dark.png")
+        assert {level(chosen.colours[0]), level(chosen.colours[5]), (68, 1, 84)} <= light
+        assert {level(DARK.colours[0]), level(DARK.colours[5]), (68, 1, 84)} <= dark
+        assert ground == level(DARK.ground if is_dark else "white")
+        assert dark_ground == level(DARK.ground if is_dark else PAGE)
+
+
 @pytest.mark.parametrize("page", sorted((DOCS / "tutorial").glob("*.md")), ids=lambda page: page.stem)
 def test_a_notebook_has_the_code_of_its_page(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
@@ -100,6 +130,27 @@ def test_the_reference_names_the_functions_of_numpy() -> None:
 
     page = (DOCS / "reference" / "numpy.md").read_text(encoding="utf-8")
     assert [name for name in fnp.__all__ if f"`{name}`" not in page] == []
+
+
+def test_the_page_of_options_names_arguments_and_values_that_there_are() -> None:
+    import inspect
+
+    import filippov as fl
+    from filippov.options import _METHODS, _POLICIES
+    from filippov.sliding_policy import _RULES
+
+    text = (DOCS / "options.md").read_text(encoding="utf-8")
+    takers = (fl.solve_ivp, fl.System, fl.System.solve, fl.Reset, fl.SlidingPolicy)
+    arguments = {name for taker in takers for name in inspect.signature(taker).parameters}
+    named = set(re.findall(r"\b([a-z_]+)=", text.replace("dt", "")))
+    assert sorted(named - arguments) == []
+    functions = set(re.findall(r"`fl\.(\w+)", text))
+    assert sorted(name for name in functions if not hasattr(fl, name)) == []
+    values = set(re.findall(r'"([\w-]+)"', text))
+    known = {*_METHODS, *_RULES, *(value for choices in _POLICIES.values() for value in choices)}
+    assert sorted(values - known) == []
+    needs_no_choice = {"RK45", "canopy"}  # SciPy's name for DOPRI5, and a default
+    assert sorted(known - values - needs_no_choice) == []
 
 
 def test_every_code_of_a_special_point_is_explained() -> None:

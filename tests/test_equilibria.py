@@ -153,3 +153,19 @@ def test_other_systems_are_refused() -> None:
         fl.equilibria(relay, [(-1, 1)])
     with pytest.raises(fl.InputError, match="System is needed"):
         fl.equilibria(lambda t, x: x, [(-1, 1)])  # type: ignore[arg-type]
+
+
+def test_an_equilibrium_whose_multipliers_hold_no_motion_is_shown() -> None:
+    """Beside phi = 0 the force of the relay is a kink of the surface phi = 0, which it cannot hold."""
+
+    @fl.system(states=("phi", "w"))
+    def swing(t, x, friction=0.05, push=0.12):
+        phi, w = x
+        return w, -np.sin(phi) + (push * (abs(phi) < 0.2) - friction) * np.sign(w)
+
+    found = fl.equilibria(swing, {"phi": (-1, 1), "w": (-1, 1)})
+    assert not found.certified  # they fill a line
+    corner = [point for point in found if point.codimension == 2]
+    assert corner
+    assert all(len(point.eigenvalues) == 0 and not point.is_stable for point in corner)
+    assert repr(found).count("Equilibrium(") == len(found)

@@ -76,8 +76,40 @@ def test_axes_are_used_and_returned(draw: Any, solution: fl.Solution) -> None:
     assert solution.plot(ax=ax) is ax
     with pytest.raises(TypeError, match=r"^ax: an axes of Matplotlib is needed, not Figure"):
         draw(solution, ax=ax.figure)
-    with pytest.raises(ValueError, match=r"no state 'w'; the names are x, v"):
+    with pytest.raises(ValueError, match=r"^j: no state 'w'; the names are x, v"):
         fl.plot.phase(solution, "x", "w")
+
+
+def test_a_state_that_is_not_there_is_named_with_its_argument(solution: fl.Solution) -> None:
+    alone = fl.solve_ivp(lambda t, x: [-np.sign(x[0])], (0, 2), [1.0])
+    with pytest.raises(ValueError, match=r"^j: there is no state 1; the only one is x\[0\], which `plot`"):
+        fl.plot.phase(alone)
+    with pytest.raises(ValueError, match=r"^k: there is no state 2; there are 2, from 0 on: x, v"):
+        fl.plot.phase3d(solution)
+    with pytest.raises(ValueError, match=r"^states: there is no state 4; there are 2"):
+        solution.plot(states=4)
+
+
+@pytest.mark.parametrize(
+    ("draw", "keyword", "message"),
+    [
+        (lambda s, **k: s.plot(**k), "state", r"'state'; did you mean 'states'\?; it takes ax, states, dark"),
+        (fl.plot.phase, "figsize", r"'figsize'; it takes i, j, ax, .*; for a size"),
+        (lambda s, **k: fl.plot.basins(None, **k), "legends", r"'legends'; did you mean 'legend'\?"),
+        (lambda s, **k: fl.plot.branches([], **k), "colour", r"'colour'; it takes x, y, ax"),
+    ],
+)
+def test_unknown_keywords_are_refused_with_those_that_there_are(
+    solution: fl.Solution, draw: Any, keyword: str, message: str
+) -> None:
+    with pytest.raises(TypeError, match=message):
+        draw(solution, **{keyword: 1})
+
+
+def test_a_portrait_names_an_unknown_option() -> None:
+    rotor = fl.System(lambda t, x: [x[1], -x[0]], n=2)
+    with pytest.raises(TypeError, match=r"'densty'; did you mean 'density'\?"):
+        fl.plot.portrait(rotor, [(-1, 1), (-1, 1)], densty=4)
 
 
 def test_style_is_the_default_inside_of_its_block_only(solution: fl.Solution) -> None:

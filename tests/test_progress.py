@@ -220,3 +220,33 @@ def test_a_notebook_gets_the_widget(monkeypatch: pytest.MonkeyPatch) -> None:
     bar.close()
     assert (made[0]["total"], made[0]["initial"], made[0]["unit"]) == (10, 2, " points")
     assert made[1:] == [{"note": "1 failed"}, {"closed": 5}]
+
+
+def test_the_search_of_equilibria_has_a_bar_of_its_share(
+    bars: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.3 * x[0] * (x[0] > a)], n=1)
+    silent = fl.equilibria(fish, [(-1, 2)])
+    assert capsys.readouterr().err == ""
+    watched = fl.equilibria(fish, [(-1, 2)], progress=True)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert re.search(r"equilibria by bounds: .*100(\.0)? ?%.* 2 found", last_line(shown.err))
+    assert repr(watched) == repr(silent)
+
+
+def test_the_search_from_many_starts_has_a_bar_too(bars: str, capsys: pytest.CaptureFixture[str]) -> None:
+    wide = fl.System(lambda t, x: [*(-x[k] for k in range(4)), 1.0 - x[4] - 0.5 * np.sign(x[0] - 2.0)], n=5)
+    found = fl.equilibria(wide, [(-3, 3)] * 5, progress=True)
+    assert [point.y.tolist() for point in found] == [[0.0, 0.0, 0.0, 0.0, 1.5]]
+    assert re.search(r"Newton's method: .*100(\.0)? ?%.* 1 found", last_line(capsys.readouterr().err))
+
+
+def test_a_manifold_has_a_bar_of_its_length(bars: str, capsys: pytest.CaptureFixture[str]) -> None:
+    duffing = fl.System(lambda t, x: [x[1], x[0] - x[0] ** 3], n=2)
+    saddle = fl.equilibrium(duffing, [0.0, 0.0])
+    silent = fl.manifold(saddle, length=3.0)
+    assert capsys.readouterr().err == ""
+    watched = fl.manifold(saddle, length=3.0, progress=True)
+    assert re.search(r"unstable manifold: .*100(\.0)? ?%.* side -1", last_line(capsys.readouterr().err))
+    assert [curve.points.tolist() for curve in watched] == [curve.points.tolist() for curve in silent]

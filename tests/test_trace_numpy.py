@@ -157,6 +157,7 @@ FORMS: dict[str, Callable[..., Any]] = {
     "cross": lambda t, x: np.cross(x, [1.0, 2.0, 3.0]),
     "gradient": lambda t, x: np.gradient(x),
     "spread": lambda t, x: [np.sum(np.diff(x) * x[:2]), np.ptp(x), x.var()],
+    "real": lambda t, x: np.real(x) * np.real(x[1]),
     "zeros_like": lambda t, x: filled(np.zeros_like(x), x),
     "empty_like": lambda t, x: filled(np.empty_like(x), x),
     "ones_like": lambda t, x: filled(np.ones_like(x, dtype=float), x),

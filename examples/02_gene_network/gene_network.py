@@ -63,7 +63,7 @@ def draw(solutions: dict[tuple[float, float], fl.Solution], path: Path) -> None:
     for start, solution in solutions.items():
         end = "(8, 8)" if solution.y[0, -1] > ON else "(0, 0)"
         fl.plot.phase(solution, "a", "b", ax=left, label=f"to {end}; heavy: slides", legend="below")
-        left.plot(*start, "o", color="0.3", markersize=3)
+        left.plot(*start, "o", color="0.4", markersize=3)
     left.plot(OFF, OFF, "*", color="k", markersize=11, zorder=4)
     left.set(xlim=(0.0, 12.7), ylim=(0.0, 12.7), xlabel="gene a", ylabel="gene b")
     left.text(8.3, 7.2, "(8, 8): both thresholds", fontsize="small")
@@ -71,6 +71,7 @@ def draw(solutions: dict[tuple[float, float], fl.Solution], path: Path) -> None:
     fl.plot.hidden_dynamics(genes, arrival.t, arrival.y_before, before=arrival.mode_before, ax=right)
     right.set_title("the arrival at (8, 8), from (6, 12)", pad=24)
     fl.plot.letters((left, right))
+    figure.draw_without_rendering()  # the layout makes room for a legend above only when it has been drawn
     figure.savefig(path, dpi=150)
 
 

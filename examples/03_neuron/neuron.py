@@ -52,7 +52,7 @@ def main(path: Path) -> None:
         ax.vlines(spikes, -50.0, 30.0, color="C0", linewidth=0.5, alpha=0.5)
         ax.axvline(20.0, color="0.5", linewidth=0.8, linestyle="--")
         ax.set(title=name, xlabel="")
-    axes[0].text(21.0, 20.0, "the current is switched on", fontsize="small", color="0.4")
+    axes[0].set_title(f"{next(iter(PATTERNS))}; dashed: the current is switched on")
     axes[-1].set_xlabel("t [ms]")
     fl.plot.letters(axes)
     figure.savefig(path, dpi=150)

@@ -43,7 +43,7 @@ def main(path: Path) -> None:
     print(f"{len(phases)} phases of sliding, the shortest lasts {min(p.duration for p in phases):.5f}")
     print(compare(numbers))
     figure = pyplot.figure(figsize=(10.4, 4.6))
-    grid = figure.add_gridspec(1, 2, left=0.02, right=0.78, bottom=0.12, top=0.95, wspace=0.25)
+    grid = figure.add_gridspec(1, 2, left=0.05, right=0.78, bottom=0.12, top=0.95, wspace=0.25)
     space = fl.plot.phase3d(solution, ax=figure.add_subplot(grid[0], projection="3d"))
     space.get_legend().remove()
     fl.plot.phase(solution, "y1", "y3", ax=figure.add_subplot(grid[1]))

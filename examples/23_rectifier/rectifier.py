@@ -72,8 +72,8 @@ def main(path: Path) -> None:
         top.plot(1e3 * t, voltage(t, k), linewidth=0.8, color=colours[k])
         bottom.plot(1e3 * t, currents[k], linewidth=1.4, color=colours[k], label=f"phase {k + 1}")
     top.plot(1e3 * t, u, linewidth=2.0, color=colours[PHASES], label="capacitor")
-    top.set(ylabel="voltage (V)", ylim=(0.0, 1.35 * AMPLITUDE))
-    bottom.set(xlabel="t (ms)", ylabel="current (A)")
+    top.set(ylabel="voltage [V]", ylim=(0.0, 1.35 * AMPLITUDE))
+    bottom.set(xlabel="t [ms]", ylabel="current [A]")
     for axes, columns in ((top, 1), (bottom, PHASES)):
         axes.legend(frameon=False, ncols=columns, loc="upper right")
     fl.plot.letters(figure.axes)

@@ -102,7 +102,7 @@ def draw(path: Path, measured: np.ndarray, p: np.ndarray, covariance: np.ndarray
         counts = np.arange(40, len(TIMES) + 1)
         inverses = [np.linalg.inv(scaled[:n].T @ scaled[:n])[k, k] for n in counts]
         axes["width"].semilogy(TIMES[counts - 1], 100 * quantile * NOISE * np.sqrt(inverses), **line)
-    for ax, label in (("record", "x in mm"), ("residuals", "residual in mm"), ("part", "change in mm")):
+    for ax, label in (("record", "x [mm]"), ("residuals", "residual [mm]"), ("part", "change [mm]")):
         for piece in fitted.segments:
             if piece.mode.is_sliding:
                 axes[ax].axvspan(piece.t_start, piece.t_end, color="0.9", linewidth=0.0, zorder=0)
@@ -118,10 +118,10 @@ def draw(path: Path, measured: np.ndarray, p: np.ndarray, covariance: np.ndarray
     axes["law"].plot(slip, value, color=COLOURS[0], linewidth=1.5, label="estimate")
     axes["law"].plot(slip, law(slip, *TRUE), "--", color="k", linewidth=1.2, label="true")
     axes["law"].plot([0.0, 0.0], [0.0, p[1]], color="0.5", linewidth=3.0, label="sticking: 0 to Fs")
-    axes["law"].set(xlabel="slip speed w in m/s", ylabel="friction force in N", ylim=(0.0, 6.0))
-    axes["width"].set(xlabel="length of the record in s", ylabel="half width in %")
+    axes["law"].set(xlabel="slip speed w [m/s]", ylabel="friction force [N]", ylim=(0.0, 6.0))
+    axes["width"].set(xlabel="length of the record [s]", ylabel="half width [%]")
     axes["width"].set_title("half width of the 95 % interval", fontsize="medium")
-    axes["part"].set_xlabel("t in s")
+    axes["part"].set_xlabel("t [s]")
     for name in ("record", "part", "law"):
         axes[name].legend(fontsize="small")
     fl.plot.letters(figure.axes)

@@ -116,7 +116,7 @@ def main(path: Path, quick: bool) -> None:
             for tick in range(2**k):
                 fl.plot.branches(branch, "E", f"v at tick {tick}", ax=ax)
         ax.get_legend().remove()
-        ax.set(xlabel="E in V", ylabel="v at the ticks in V")
+        ax.set(xlabel="E [V]", ylabel="v at the ticks [V]")
     axes[0].set(xlim=(20.0, 33.0), ylim=(11.7, 12.6))
     axes[1].set(xlim=(30.5, 33.0), ylim=(11.9, 12.5))
     fl.plot.letters(figure.axes)

@@ -68,6 +68,7 @@ def arrival(solution: fl.Solution) -> float:
     return float(solution.switches[-1].t)
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     gains = np.geomspace(0.5, 4.0, 10)
     spans = {"twisting": (0.0, 8.0), "terminal": (0.0, 8.0)}
@@ -96,7 +97,7 @@ def main(path: Path) -> None:
 
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.4, 4.4), layout="constrained")
     t = np.linspace(0.0, 5.0, 2000)
-    colours = {"super-twisting": "tab:blue", "terminal": "tab:orange"}
+    colours = {"super-twisting": "C0", "terminal": "C1"}
     left.plot(
         t,
         twisting.solve((0, 5), [0.0, 1.0], **TOLERANCES).sol(t)[0],
@@ -110,8 +111,8 @@ def main(path: Path) -> None:
         color=colours["terminal"],
         label="terminal, b = 1",
     )
-    left.set(xlabel="t", ylabel="x")
-    left.legend(frameon=False, fontsize="small")
+    left.set(xlabel="t", ylabel="x", title="the target is reached in finite time")
+    left.legend()
     fine = np.geomspace(0.45, 4.4, 200)
     right.loglog(fine, [twisting_time(L) for L in fine], color=colours["super-twisting"], linewidth=0.8)
     right.loglog(
@@ -134,8 +135,9 @@ def main(path: Path) -> None:
     right.set_yticks([0.3, 1.0, 3.0], labels=["0.3", "1", "3"], minor=False)
     right.xaxis.set_minor_formatter("")
     right.yaxis.set_minor_formatter("")
-    right.set_title("runs (markers) and closed forms (lines)", loc="left", fontsize="medium")
-    right.legend(frameon=False, fontsize="small")
+    right.set_title("runs (markers) and closed forms (lines)")
+    right.legend()
+    fl.plot.letters((left, right))
     figure.savefig(path, dpi=150)
 
 

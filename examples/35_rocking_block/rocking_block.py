@@ -112,6 +112,7 @@ def impacts_by_hand(t: float, count: int) -> list[float]:
     return found
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     solution = block.solve((0.0, T_END), [0.0, 0.0], rtol=1e-10, atol=1e-12)
     switches = solution.switches
@@ -139,26 +140,23 @@ def main(path: Path) -> None:
     assert solution.y[:, -1].tolist() == [0.0, 0.0]
 
     figure, (top, bottom) = pyplot.subplots(2, 1, figsize=(8.4, 6.0), layout="constrained", sharex=True)
-    top.plot(TABLE_T, TABLE_A, linewidth=0.7, color="0.3")
+    top.plot(TABLE_T, TABLE_A, linewidth=0.7, color="0.4")
     limit = GRAVITY * math.tan(ALPHA)
     for value in (limit, -limit):
-        top.axhline(value, color="tab:red", linewidth=0.8, linestyle="--")
-    top.set_ylabel("ground, m/s$^2$")
-    top.set_title(
-        "synthetic ground motion; beyond the dashed lines a standing block begins to rock",
-        loc="left",
-        fontsize="medium",
-    )
+        top.axhline(value, color="C5", linewidth=0.8, linestyle="--")
+    top.set_ylabel("ground [m/s$^2$]")
+    top.set_title("synthetic ground motion; beyond the dashed lines a standing block begins to rock")
     t = np.linspace(0.0, T_END, 6000)
     bottom.plot(t, solution.sol(t)[0], linewidth=1.0)
     for at, height, marker, color, label in (
-        (starts, 0.024, "^", "tab:red", "begins to rock"),
-        (rests, 0.022, "s", "tab:green", "stands again"),
+        (starts, 0.024, "^", "C5", "begins to rock"),
+        (rests, 0.022, "s", "C2", "stands again"),
     ):
         bottom.plot(at, height + 0 * at, marker, color=color, markersize=5, label=label)
-    bottom.set_ylabel("angle of the block, rad")
-    bottom.set_xlabel("t, s")
-    bottom.legend(frameon=False, fontsize="small", loc="lower right")
+    bottom.set_ylabel("angle of the block [rad]")
+    bottom.set_xlabel("t [s]")
+    bottom.legend(loc="lower right")
+    fl.plot.letters((top, bottom))
     figure.savefig(path, dpi=150)
 
 

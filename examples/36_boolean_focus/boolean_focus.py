@@ -44,6 +44,7 @@ def rates(t, x):
 network = fl.System(rates, n=4, states=("x1", "x2", "x3", "x4"))
 
 
+@fl.plot.style()
 def main(path: Path) -> None:
     with warnings.catch_warnings(record=True) as shown:
         warnings.simplefilter("always", fl.FilippovWarning)
@@ -89,18 +90,19 @@ def main(path: Path) -> None:
     left.axvline(THRESHOLDS[1], color="0.6", linewidth=0.8)
     left.axhline(THRESHOLDS[2], color="0.6", linewidth=0.8)
     left.set(xlabel="x2", ylabel="x3")
-    left.set_title("two genes around their thresholds, to t = 6", loc="left", fontsize="medium")
+    left.set_title("two genes around their thresholds, to t = 6")
     right.semilogy(t, size, ".", markersize=2, label="size of a round")
     right.semilogy(t, number + 1, ".", markersize=2, label="number of rounds")
     right.semilogy(
         t, size[late][0] * np.exp(t[late][0] - t), "--", color="0.4", linewidth=0.8, label="$e^{-t}$, $e^t$"
     )
     right.semilogy(t, number[late][0] * np.exp(t - t[late][0]), "--", color="0.4", linewidth=0.8)
-    right.axvline(limit.t, color="tab:red", linewidth=0.8, label="the mean takes over")
+    right.axvline(limit.t, color="C5", linewidth=0.8, label="the mean takes over")
     right.set_xlabel("t")
     right.set_ylim(1e-6, 1e6)
-    right.legend(frameon=False, fontsize="small", loc="lower left")
-    right.set_title("rounds without end", loc="left", fontsize="medium")
+    right.legend(loc="lower left")
+    right.set_title("rounds without end")
+    fl.plot.letters((left, right))
     figure.savefig(path, dpi=150)
 
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
 from filippov.errors import InputError
 
-__all__ = ["Bar", "BranchBar", "Progress", "Report", "print_progress", "report_of_members"]
+__all__ = ["Bar", "BranchBar", "Progress", "Report", "print_progress", "report_of_members", "share_bar"]
 
 # Seconds between two updates of the plain line.
 _EVERY = 0.1
@@ -114,9 +115,11 @@ def _tqdm(total: float | None, unit: str, name: str, done: float, delay: float) 
     if unit == "t":
         share = "{percentage:3.0f}%|{bar}| t = {n:.6g} of {total:.6g} " if total else "t = {n:.6g} "
         style = {"unit": "", "bar_format": "{desc}" + share + "[{elapsed}<{remaining}, {rate_fmt}{postfix}]"}
+    elif unit == "%":
+        style = {"bar_format": "{desc}{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}{postfix}]"}
     return tqdm(
         total=total,
-        desc=name or None,
+        desc=f"{name}: " if name else None,
         initial=done,
         delay=delay,
         file=sys.stderr,
@@ -245,6 +248,22 @@ class Progress:
         """End the line of a bar."""
         if self._bar is not None:
             self._bar.close()
+
+
+@contextmanager
+def share_bar(wanted: bool, name: str) -> Iterator[Callable[[float, str], None]]:
+    """Yield a function of the share that is done, and of a few words; it keeps a bar, if one is wanted."""
+    bar = Bar(100.0, "%", name) if wanted else None
+
+    def show(share: float, note: str) -> None:
+        if bar is not None:
+            bar.to(100.0 * min(max(share, 0.0), 1.0), note)
+
+    try:
+        yield show
+    finally:
+        if bar is not None:
+            bar.close()
 
 
 class BranchBar:

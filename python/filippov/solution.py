@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
@@ -897,14 +896,6 @@ class Solution:
         """
         from filippov.plot import time_series
 
-        known = inspect.signature(time_series).parameters
-        for name in options:
-            if name not in known:
-                hint = did_you_mean(name, known)
-                raise TypeError(
-                    f"plot() got an unexpected keyword argument {name!r}{hint}; it takes "
-                    f"{', '.join(list(known)[1:])}; for a size or a title, give axes of your own as ax="
-                )
         return time_series(self, ax=ax, states=states, dark=dark, **options)
 
     def __repr__(self) -> str:

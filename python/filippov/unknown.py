@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["check_unknown", "did_you_mean", "refuse_former"]
+__all__ = ["check_unknown", "did_you_mean", "drawing", "refuse_former"]
+
+_P, _R = ParamSpec("_P"), TypeVar("_R")
 
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 # Keywords of earlier versions, and what to write now.
@@ -55,6 +58,24 @@ def refuse_former(names: Iterable[str], function: Callable[..., Any], parameters
     for name in names:
         if name in _FORMER and name not in parameters:
             raise TypeError(f"{function.__name__}() has no argument {name!r} any more: {_FORMER[name]}")
+
+
+def drawing(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a function that draws refuse unknown keywords, with those that it takes."""
+    known = list(inspect.signature(function).parameters)
+
+    @functools.wraps(function)
+    def checked(*arguments: _P.args, **keywords: _P.kwargs) -> _R:
+        for name in keywords:
+            if name not in known:
+                raise TypeError(
+                    f"{function.__name__}() got an unexpected keyword argument {name!r}"
+                    f"{did_you_mean(name, known)}; it takes {', '.join(known[1:])}; for a size, a title, "
+                    "or other colours, give axes of your own as ax=, or change those that are returned"
+                )
+        return function(*arguments, **keywords)
+
+    return checked
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -132,7 +132,8 @@ def _print(solution: Solution, model: Model, values: dict[str, float]) -> None:
     if given:
         print("parameters: " + ", ".join(f"{name}={value:.12g}" for name, value in given.items()))
     print("surfaces:   " + (", ".join(f"{name} = 0" for name in solution.surfaces) or "none"))
-    print(f"run:        {solution.message}")
+    # The reason of a failure is the last line of all, on the error stream.
+    print(f"run:        {solution.message if solution.success else 'not complete'}")
     if len(solution.t):
         state = ", ".join(
             f"{name}={value:.12g}" for name, value in zip(solution.states, solution.y[:, -1], strict=True)

@@ -28,6 +28,8 @@ from filippov.progress import Bar
 __all__ = ["add_sweep_options", "sweep"]
 
 _RETURNS, _TRANSIENT = 100, 400
+# So many attractors are listed with their shares.
+_MOST_NAMED = 8
 
 
 def add_sweep_options(command: argparse.ArgumentParser) -> None:
@@ -47,7 +49,9 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
         "--csv", type=Path, metavar="FILE", help="write one row per return, or per point; - prints"
     )
     out.add_argument("--json", type=Path, metavar="FILE", help="write the same as JSON; - prints it")
-    out.add_argument("--plot", type=Path, metavar="FILE", help="draw the returns over the parameter")
+    out.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw returns over one parameter, or basins over two states"
+    )
     out.add_argument("--state", metavar="NAME", help="the state to draw; the first by default")
     out.add_argument("--dark", action="store_true", help="light dots on a dark ground")
     out.add_argument("--quiet", action="store_true", help="print nothing but failures")
@@ -64,8 +68,13 @@ def sweep(given: argparse.Namespace) -> int:
         raise Mistake("--param: a sweep needs values, like omega=0.2:2:500 or omega=1,2,4")
     if given.plot is not None:
         check_picture(given.plot)
-        if section is None or len(names) != 1:
-            raise Mistake("--plot: one parameter with several values is needed, and --period or --section")
+        if len(names) != 2 and (section is None or len(names) != 1):
+            raise Mistake(
+                "--plot: one parameter with several values is needed, and --period or --section; or two with "
+                "several values for basins, like --y0 x=-2:2:50 v=-2:2:50"
+            )
+        if len(names) == 2:
+            check_needs(given, ("state",), "--plot over one parameter")
     else:
         check_needs(given, ("state", "dark"), "--plot, the name of a picture")
     if all(target is None for target in (given.csv, given.json, given.plot, given.store)):
@@ -82,22 +91,22 @@ def sweep(given: argparse.Namespace) -> int:
             raise Mistake(f"--{name}: is about returns; give --period or --section, or section in the file")
     if section is not None:
         options |= {
-            "section": section,
             "n": _RETURNS if given.returns is None else given.returns,
             "transient": _TRANSIENT if given.transient is None else given.transient,
-            "until_periodic": True,
             "follow": given.follow,
         }
     elif given.follow:
         options["follow"] = True
     cut = None
     try:
-        result = analysis.sweep(
-            *(model.system, _span(given, model, section), y0, params),
-            store=given.store,
-            threads=given.threads,
-            **options,
-        )
+        where = (_span(given, model, section), y0, params)
+        options |= {"store": given.store, "threads": given.threads}
+        if given.plot is not None and len(names) == 2:
+            result = analysis.basins(model.system, section, *where, **options)
+        else:
+            if section is not None:
+                options |= {"section": section, "until_periodic": True}
+            result = analysis.sweep(model.system, *where, **options)
     except Interrupted as error:
         if given.store is not None:
             raise KeyboardInterrupt(
@@ -212,6 +221,11 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
         periods, counts = np.unique(result.period.values, return_counts=True)
         shown = [f"{p or 'none'}: {c}" for p, c in zip(periods, counts, strict=True)]
         say(given, f"returns:  {result.sizes['obs']}; points by period found: {', '.join(shown)}")
+    if "attractor" in result:
+        shares = [f"{number}: {share:.3g}" for number, share in enumerate(result.attractor_size.values)]
+        more = ", ..." if len(shares) > _MOST_NAMED else ""
+        shown = f"; shares of the points: {', '.join(shares[:_MOST_NAMED])}{more}" if shares else ""
+        say(given, f"basins:   {len(shares)} attractors{shown}")
     if given.csv is not None:
         rows = _write_csv(result, given.csv)
         say(given, f"written:  {given.csv}, {rows} rows")
@@ -269,5 +283,10 @@ def _columns(result: Any) -> dict[str, Any]:
 
 
 def _draw(given: argparse.Namespace, result: Any, swept: str, state: str) -> None:
-    write_picture(given.plot, given.dark, None, lambda plot: plot.bifurcation_diagram(result, state, swept))
+    def draw(plot: Any) -> Any:
+        return (
+            plot.basins(result) if "attractor" in result else plot.bifurcation_diagram(result, state, swept)
+        )
+
+    write_picture(given.plot, given.dark, None, draw)
     say(given, f"picture:  {given.plot}")

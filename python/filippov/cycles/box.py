@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, overload
 
 import numpy as np
@@ -19,6 +19,7 @@ from filippov.cycles.motions import Array, Motions
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.errors import InputError, ModelError
 from filippov.prepare import parameter_vector
+from filippov.progress import share_bar
 from filippov.scalars import real
 from filippov.system import System
 from filippov.unknown import did_you_mean
@@ -76,6 +77,7 @@ def equilibria(
     params: Mapping[str, float] | None = None,
     *,
     virtual: bool = False,
+    progress: bool = False,
     **options: Any,
 ) -> Equilibria:
     """Return all equilibria and pseudo-equilibria of all modes in a box of states.
@@ -95,6 +97,8 @@ def equilibria(
     virtual : bool, optional
         Return also those that the system does not have: outside of their region, or with multipliers beyond
         -1 and 1, up to 100 in size. Default: no.
+    progress : bool, optional
+        Show a bar: the share of the box that is searched, over all modes; then that of the starts.
     **options
         Options of `solve_ivp`, for what an `Equilibrium` runs.
 
@@ -140,7 +144,7 @@ def equilibria(
         )
     if depends_on_time(motions, 1.0):
         raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
-    search = _Search(motions, core, low, high, virtual)
+    search = _Search(motions, core, low, high, virtual, progress)
     modes = list(_modes(search))
     is_small = len(low) <= _MOST_STATES and len(modes) <= _MOST_MODES
     found, unresolved = _by_bounds(search, modes) if is_small else ([], [search.states_of(low, high)])
@@ -191,6 +195,7 @@ class _Search(NamedTuple):
     low: Array
     high: Array
     virtual: bool
+    progress: bool
 
     @property
     def n(self) -> int:
@@ -240,17 +245,26 @@ def _modes(search: _Search) -> Iterator[tuple[int, ...]]:
 
 def _by_bounds(search: _Search, modes: Sequence[tuple[int, ...]]) -> tuple[list[Equilibrium], list[Array]]:
     """Return the equilibria of all modes, and the boxes for which nothing was proved."""
+    with share_bar(search.progress, "equilibria by bounds") as show:
+        return _proved(search, modes, show)
+
+
+def _proved(
+    search: _Search, modes: Sequence[tuple[int, ...]], show: Callable[[float, str], None]
+) -> tuple[list[Equilibrium], list[Array]]:
     found: list[Equilibrium] = []
     unresolved: list[Array] = []
     left = _MOST_BOXES
-    for mode in modes:
+    for k, mode in enumerate(modes):
         curve = EquilibriumCurve(search.motions, mode)
         try:
             bounds = ModeBounds(search.core, list(mode))
         except ValueError:
             return [], [search.states_of(search.low, search.high)]
         proof = _Proof(search, curve, bounds, left)
-        left = proof.run()
+        for done in proof.run():
+            show((k + done) / len(modes), f"{len(found)} found")
+        left = proof.left
         for w in proof.zeros:
             try:
                 point = rest_of(curve, w)
@@ -259,6 +273,7 @@ def _by_bounds(search: _Search, modes: Sequence[tuple[int, ...]]) -> tuple[list[
             if search.wants(point):
                 # A zero on the border of two boxes may have been proved in both.
                 found = _merged(search, found, [point], 1e-10)
+        show((k + 1) / len(modes), f"{len(found)} found")
         unresolved += [search.states_of(low, high) for low, high in proof.unresolved]
     return found, unresolved
 
@@ -267,7 +282,9 @@ class _Proof:
     """Divides a box until each part is proved to have no zero of the equations of a mode, or exactly one."""
 
     def __init__(self, search: _Search, curve: EquilibriumCurve, bounds: ModeBounds, most: int) -> None:
-        self._search, self._curve, self._bounds, self._left = search, curve, bounds, most
+        self._search, self._curve, self._bounds = search, curve, bounds
+        # How many boxes more may be looked at.
+        self.left = most
         self._p = parameter_vector(search.motions.params)
         n, m = search.n, len(curve.sliding)
         self._rows = [*range(n), *(n + j for j in curve.sliding)]
@@ -280,32 +297,42 @@ class _Proof:
         self.unresolved: list[tuple[Array, Array]] = []
         self._proved: list[tuple[Array, Array]] = []
 
-    def run(self) -> int:
-        """Divide the box; return how many boxes more may be looked at."""
+    def run(self) -> Iterator[float]:
+        """Divide the box; yield the share of it that is searched, after each part."""
         pending = [(self._low, self._high)]
-        size = self._high - self._low
+        done = 0.0
         while pending:
             low, high = pending.pop()
-            if any(np.all(low >= a) and np.all(high <= b) for a, b in self._proved):
-                continue
-            if self._left <= 0:
-                self.unresolved.append((low, high))
-                continue
-            self._left -= 1
-            narrowed = self._narrowed(low, high)
-            if narrowed is None:
-                continue
-            low, high = narrowed
-            relative = (high - low) / size
-            k = int(np.argmax(relative))
-            if relative[k] < _NARROWEST:
-                self.unresolved.append((low, high))
-                continue
-            middle = 0.5 * (low[k] + high[k])
-            below, above = high.copy(), low.copy()
-            below[k], above[k] = middle, middle
-            pending += [(low, below), (above, high)]
-        return self._left
+            share = self._share(low, high)
+            parts = self._divided(low, high)
+            done += share - sum(self._share(*part) for part in parts)
+            pending += parts
+            yield done
+
+    def _share(self, low: Array, high: Array) -> float:
+        return float(np.prod((high - low) / (self._high - self._low)))
+
+    def _divided(self, low: Array, high: Array) -> list[tuple[Array, Array]]:
+        """Return the halves of what a box leaves to search."""
+        if any(np.all(low >= a) and np.all(high <= b) for a, b in self._proved):
+            return []
+        if self.left <= 0:
+            self.unresolved.append((low, high))
+            return []
+        self.left -= 1
+        narrowed = self._narrowed(low, high)
+        if narrowed is None:
+            return []
+        low, high = narrowed
+        relative = (high - low) / (self._high - self._low)
+        k = int(np.argmax(relative))
+        if relative[k] < _NARROWEST:
+            self.unresolved.append((low, high))
+            return []
+        middle = 0.5 * (low[k] + high[k])
+        below, above = high.copy(), low.copy()
+        below[k], above[k] = middle, middle
+        return [(low, below), (above, high)]
 
     def _narrowed(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Return the part of a box that may have zeros that are not known; None if there is none."""
@@ -398,16 +425,18 @@ def _by_starts(search: _Search, modes: Sequence[tuple[int, ...]]) -> list[Equili
     if len(modes) > _MOST_MODES:
         modes = _modes_at(search, starts)
     found: list[Equilibrium] = []
-    for mode in modes:
-        curve = EquilibriumCurve(search.motions, mode)
-        for x in starts[: max(_FEWEST_STARTS, _MOST_RUNS // len(modes))]:
-            multipliers = random.uniform(-1.0, 1.0, len(curve.sliding))
-            try:
-                point = rest_of(curve, np.append(x, multipliers))
-            except (ModelError, np.linalg.LinAlgError):
-                continue
-            if search.wants(point):
-                found = _merged(search, found, [point], _SAME)
+    with share_bar(search.progress, "equilibria by Newton's method") as show:
+        for k, mode in enumerate(modes):
+            curve = EquilibriumCurve(search.motions, mode)
+            for x in starts[: max(_FEWEST_STARTS, _MOST_RUNS // len(modes))]:
+                multipliers = random.uniform(-1.0, 1.0, len(curve.sliding))
+                try:
+                    point = rest_of(curve, np.append(x, multipliers))
+                except (ModelError, np.linalg.LinAlgError):
+                    continue
+                if search.wants(point):
+                    found = _merged(search, found, [point], _SAME)
+            show((k + 1) / len(modes), f"{len(found)} found")
     return found
 
 

@@ -10,7 +10,7 @@ Kostelich, Yorke, Int. J. Bifurcation and Chaos 1 (1991) 605 (images of a segmen
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium
 from filippov.cycles.return_map import ReturnMap, Stuck
 from filippov.errors import InputError
+from filippov.progress import share_bar
 from filippov.scalars import positive
 from filippov.solution import Solution
 from filippov.system import System
@@ -35,6 +36,10 @@ _PER_STEP, _MOST_RUNS, _LONGER = 16, 40, 1.5
 _AT_REST = 1e-7
 # Points of the first segment; the largest gap, in units of the size; how many points are too many.
 _FIRST_POINTS, _GAP, _MOST_POINTS = 16, 0.01, 4000
+
+
+# One side, and what is told how much of its length is followed.
+_Side = tuple[int, Callable[[float], None]]
 
 
 class ManifoldCurve(NamedTuple):
@@ -64,6 +69,8 @@ def manifold(
     which: str = "unstable",
     length: float | None = None,
     sides: Sequence[int] = (1, -1),
+    *,
+    progress: bool = False,
 ) -> list[ManifoldCurve]:
     """Return the stable or unstable manifold of an equilibrium or a cycle, if it has one dimension.
 
@@ -77,6 +84,8 @@ def manifold(
         How long the curves are. Default: ten times the largest component of the state, at least 10.
     sides : sequence of {1, -1}, optional
         Which sides.
+    progress : bool, optional
+        Show a bar: the share of the length that is followed.
 
     Returns
     -------
@@ -109,13 +118,21 @@ def manifold(
     chosen = [int(side) for side in sides]
     if not chosen or any(side not in (1, -1) for side in chosen):
         raise InputError(f"sides: 1, -1 or both are needed, not {sides!r}")
-    if isinstance(start, Equilibrium):
-        reach = _reach(length, start.y)
-        return _of_equilibrium(start, which, reach, chosen)
-    if isinstance(start, Cycle):
-        reach = _reach(length, start.y0)
-        return _of_cycle(start, which, reach, chosen)
+    with share_bar(progress, f"{which} manifold") as show:
+        if isinstance(start, Equilibrium):
+            reach = _reach(length, start.y)
+            return _of_equilibrium(start, which, reach, _sides(chosen, reach, show))
+        if isinstance(start, Cycle):
+            reach = _reach(length, start.y0)
+            return _of_cycle(start, which, reach, _sides(chosen, reach, show))
     raise InputError(f"start: an equilibrium or a cycle is needed, not {type(start).__name__}")
+
+
+def _sides(chosen: Sequence[int], length: float, show: Callable[[float, str], None]) -> Iterator[_Side]:
+    """Yield each side, with a function to tell how much of its length is followed."""
+    for k, side in enumerate(chosen):
+        yield side, lambda done, k=k, side=side: show((k + done / length) / len(chosen), f"side {side:+d}")
+        show((k + 1) / len(chosen), f"side {side:+d}")
 
 
 def _reach(length: float | None, x: Array) -> float:
@@ -134,7 +151,7 @@ def _refuse_dimension(which: str, dimension: int, what: str) -> None:
 
 
 def _of_equilibrium(
-    start: Equilibrium, which: str, length: float, sides: Sequence[int]
+    start: Equilibrium, which: str, length: float, sides: Iterator[_Side]
 ) -> list[ManifoldCurve]:
     what = f"this {'pseudo-' if start.codimension else ''}equilibrium"
     if not start.is_admissible:
@@ -158,9 +175,9 @@ def _of_equilibrium(
     system = start.system if which == "unstable" else _reversed(start.system)
     begin = _beside_surface if leads else _along_eigenvector
     found = []
-    for side in sides:
+    for side, report in sides:
         x, duration = begin(start, which, length, side)
-        found.append(_followed(start, system, x, duration, length, side, which))
+        found.append(_followed(start, system, x, duration, length, side, which, report))
     return found
 
 
@@ -212,7 +229,14 @@ def _oriented(vector: Array) -> Array:
 
 
 def _followed(
-    start: Equilibrium, system: System, x: Array, duration: float, length: float, side: int, which: str
+    start: Equilibrium,
+    system: System,
+    x: Array,
+    duration: float,
+    length: float,
+    side: int,
+    which: str,
+    report: Callable[[float], None],
 ) -> ManifoldCurve:
     """Follow a trajectory until it is long enough, rests or fails, or reversed time ends."""
     options: Mapping[str, Any] = start._curve.motions.options
@@ -230,6 +254,7 @@ def _followed(
             break
         parts.append(points[:, 1:])
         done += float(along[-1])
+        report(done)
         t += float(times[-1])
         if reason:
             break
@@ -276,7 +301,7 @@ def _at_length(run: Solution, start: Array, between: tuple[float, float], length
     return np.asarray(run.sol(high))
 
 
-def _of_cycle(start: Cycle, which: str, length: float, sides: Sequence[int]) -> list[ManifoldCurve]:
+def _of_cycle(start: Cycle, which: str, length: float, sides: Iterator[_Side]) -> list[ManifoldCurve]:
     if which == "stable":
         raise InputError(
             "start: the stable manifold of a cycle is not followed, for sliding is not reversible"
@@ -288,10 +313,18 @@ def _of_cycle(start: Cycle, which: str, length: float, sides: Sequence[int]) -> 
         raise InputError("start: the flow does not follow the cycle")
     returns = ReturnMap(start)
     multiplier, vector = returns.unstable()
-    return [_images(returns, multiplier, _oriented(vector), length, side) for side in sides]
+    vector = _oriented(vector)
+    return [_images(returns, multiplier, vector, length, side, report) for side, report in sides]
 
 
-def _images(returns: ReturnMap, multiplier: float, vector: Array, length: float, side: int) -> ManifoldCurve:
+def _images(
+    returns: ReturnMap,
+    multiplier: float,
+    vector: Array,
+    length: float,
+    side: int,
+    report: Callable[[float], None],
+) -> ManifoldCurve:
     """Return the images of a segment along the eigenvector, one after the other, without large gaps."""
     turns = 1 if multiplier > 0.0 else 2  # with a negative multiplier two returns come back to the side
     growth = abs(multiplier) ** turns
@@ -341,6 +374,7 @@ def _images(returns: ReturnMap, multiplier: float, vector: Array, length: float,
                 return _finished(side, points, length, f"its length is {length:g}")
             points.append(here)
             done += gap
+            report(done)
             i += 1
         k += 1
         if done < _AT_REST * length and k > 400:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov.analysis.observe import check_keywords
 from filippov.arrays import finite_array
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.forcing import depends_on_time
@@ -172,6 +173,7 @@ def phase_portrait(
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    check_keywords(options, system, phase_portrait)
     if system.n not in (None, 2):
         raise InputError(f"system: a portrait is of two states, not {system.n}")
     window = finite_array([list(pair) for pair in box], "box")

@@ -80,8 +80,14 @@ class Equilibrium:
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
-        """Those of its motion: n in a region, n - m on m surfaces; the largest real part first."""
-        found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
+        """Those of its motion: n in a region, n - m on m surfaces; the largest real part first.
+
+        They are not a number where no multipliers keep a motion beside the equilibrium on its surfaces.
+        """
+        try:
+            found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
+        except np.linalg.LinAlgError:
+            return np.full(len(self.y) - self.codimension, complex(np.nan, np.nan))
         return found[np.lexsort((-found.imag, -found.real))]
 
     @cached_property

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from filippov.plot.labels import place_labels
 from filippov.plot.style import Theme, draw_legend, handle, new_axes, numbered_colour, theme
+from filippov.unknown import drawing
 
 if TYPE_CHECKING:
     from filippov.cycles.branch import Branch
@@ -48,6 +49,7 @@ class _Part(NamedTuple):
     y: Array
 
 
+@drawing
 def branches(
     drawn: Branch | Sequence[Branch],
     x: str | None = None,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from filippov.plot.style import Theme, draw_legend, entries_of, new_axes, numbered_colour, theme
+from filippov.unknown import drawing
 
 __all__ = ["basins", "bifurcation_diagram", "poincare_section"]
 
@@ -15,6 +16,7 @@ _SMALL, _LARGE = 0.9, 2.5
 _FEW = 2000
 
 
+@drawing
 def bifurcation_diagram(
     data: Any,
     y: str,
@@ -71,6 +73,7 @@ def bifurcation_diagram(
     return ax
 
 
+@drawing
 def poincare_section(
     data: Any, x: str, y: str, ax: Any = None, dark: bool | None = None, *, legend: bool | str = True
 ) -> Any:
@@ -112,6 +115,7 @@ def poincare_section(
     return ax
 
 
+@drawing
 def basins(
     data: Any,
     variable: str | None = None,

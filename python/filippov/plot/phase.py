@@ -22,6 +22,7 @@ from filippov.plot.style import (
     theme,
 )
 from filippov.solution import Solution
+from filippov.unknown import drawing
 
 __all__ = ["phase", "phase3d"]
 
@@ -29,6 +30,7 @@ __all__ = ["phase", "phase3d"]
 _MOST_DOTS = 200
 
 
+@drawing
 def phase(
     solution: Solution,
     i: int | str = 0,
@@ -77,12 +79,13 @@ def phase(
     >>> problem = fl.problems.get("dieci_lopez_6_1")
     >>> axes = fl.plot.phase(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
-    shown = curves_of(solution, [i, j])
+    shown = curves_of(solution, [i, j], "ij")
     ax = new_axes(ax, (5.6, 4.2), dark)
     _draw(ax, solution, shown, _Look(dark, legend, label, units))
     return ax
 
 
+@drawing
 def phase3d(
     solution: Solution,
     i: int | str = 0,
@@ -130,7 +133,7 @@ def phase3d(
     >>> solution = fl.solve_ivp(problem.fun, problem.t_span, problem.y0, args=problem.args)
     >>> axes = fl.plot.phase3d(solution)  # doctest: +SKIP
     """
-    shown = curves_of(solution, [i, j, k])
+    shown = curves_of(solution, [i, j, k], "ijk")
     ax = new_axes(ax, (6.4, 5.0), dark, projection="3d")
     _draw(ax, solution, shown, _Look(dark, legend, label, units))
     ax.set_zlabel(label_of(shown.names[2], units))

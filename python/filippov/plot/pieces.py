@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,8 +193,10 @@ def _function(solution: Solution, name: str) -> Callable[..., Any]:
     return (lambda t, x, *_, **values: values[name]) if known is None else known
 
 
-def curves_of(solution: Solution, wanted: Any) -> Curves:
+def curves_of(solution: Solution, wanted: Any, arguments: Sequence[str] = ()) -> Curves:
     """Return the states asked for, by number or name, discrete states and outputs; ``None`` is all states.
+
+    A message names the one of `arguments` that is wrong; by default they are ``states``.
 
     Raises
     ------
@@ -209,7 +212,7 @@ def curves_of(solution: Solution, wanted: Any) -> Curves:
         return Curves(tuple(range(len(names))), tuple(names))
     chosen = [wanted] if isinstance(wanted, (int, np.integer, str)) else list(wanted)
     places: list[int | str] = []
-    for entry in chosen:
+    for argument, entry in zip_longest(arguments, chosen, fillvalue="states"):
         if isinstance(entry, str):
             if entry in names:
                 places.append(names.index(entry))
@@ -218,10 +221,13 @@ def curves_of(solution: Solution, wanted: Any) -> Curves:
             else:
                 known = ", ".join([*names, *outputs])
                 kind = "state or output" if outputs else "state"
-                raise ValueError(f"states: no {kind} {entry!r}; the names are {known}")
+                raise ValueError(f"{argument}: no {kind} {entry!r}; the names are {known}")
         elif -len(names) <= int(entry) < len(names):
             places.append(int(entry) % len(names))
         else:
-            raise ValueError(f"states: {entry!r} is not one of {len(names)} states")
+            known = f"there are {len(names)}, from 0 on: {', '.join(names)}"
+            if len(names) == 1:
+                known = f"the only one is {names[0]}, which `plot` of the solution draws over time"
+            raise ValueError(f"{argument}: there is no state {entry}; {known}")
     shown = tuple(names[place] if isinstance(place, int) else place for place in places)
     return Curves(tuple(places), shown)

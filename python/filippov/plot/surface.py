@@ -9,6 +9,7 @@ import numpy as np
 
 from filippov.plot.style import Theme, draw_legend, entries_of, handle, new_axes, theme
 from filippov.sheets import SurfaceParts
+from filippov.unknown import drawing
 
 __all__ = ["surface"]
 
@@ -23,6 +24,7 @@ _WIDTHS = {"attracting": 2.0, "repelling": 2.0, "crossing": 1.4}
 _OPACITY = {"attracting": 0.25, "repelling": 0.3, "crossing": 0.15}
 
 
+@drawing
 def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legend: bool | str = True) -> Any:
     """Draw a surface: the parts that attract, repel and are crossed differ in colour and in style.
 

@@ -28,6 +28,7 @@ from filippov.plot.style import (
     theme,
 )
 from filippov.solution import Solution
+from filippov.unknown import drawing
 
 __all__ = ["time_series"]
 
@@ -44,6 +45,7 @@ _STRIP, _STRIP_SLIDING, _FREE = 0.02, 0.04, 0.1
 _WIDTH_OF_A_LETTER = 0.014
 
 
+@drawing
 def time_series(
     solution: Solution,
     ax: Any = None,

@@ -323,6 +323,7 @@ def _sorted_place(a: Any, v: Any, side: str, what: str) -> Any:
 
 
 _FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.real: lambda val: val,  # traced values are real
     np.where: _where,
     np.clip: _clip,
     np.select: _select,

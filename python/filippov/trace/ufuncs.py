@@ -248,6 +248,7 @@ ELEMENTS: dict[str, Element] = {
     "negative": _operator(operator.neg),
     "positive": _scalar,
     "conjugate": _scalar,
+    "real": _scalar,  # a ufunc from NumPy 2.5 on
     "square": _square,
     "reciprocal": lambda a: 1.0 / _scalar(a),
     "deg2rad": _scaled(math.pi / 180.0),
