@@ -17,8 +17,8 @@ use crate::tolerances::{
 /// The way of a motion that is held to surfaces, as straight lines.
 pub(crate) struct Clinging {
     pub surfaces: Vec<usize>,
-    /// The mode in which it begins; that of a held surface is the side on which the motion is.
-    pub mode: Mode,
+    /// The mode in which it begins, if the surfaces hold it like roots: their entries are the sides on which the motion is.
+    pub mode: Option<Mode>,
     /// Does it end where the motion leaves a surface?
     pub leaves: bool,
     /// The ends of the lines.
@@ -49,8 +49,11 @@ pub(crate) fn cling(
             mode.set(j, -mode.entries()[j]);
         }
     }
-    // Other surfaces may be slid on; or the motion leaves them too.
+    // Other surfaces may be slid on; or roots hold the motion on all of them.
     for leaves_others in [false, true] {
+        if leaves_others && !only_roots {
+            break;
+        }
         let mut roots = Roots {
             at: *at,
             mode: mode.clone(),
@@ -191,7 +194,7 @@ impl Roots<'_, '_, '_> {
         }
         let clinging = Clinging {
             surfaces: self.surfaces,
-            mode: first,
+            mode: self.only_roots.then_some(first),
             leaves,
             pieces,
         };

@@ -121,7 +121,7 @@ impl<'a> Integrator<'a> {
             }
         }
         if let Some(j) = self.recorder.surface_touched_in_a_row() {
-            if let Some(ended) = self.rest_on_touched(j)? {
+            if let Some(ended) = rest_on_touched(self, j)? {
                 return Ok(ended);
             }
         }
@@ -303,21 +303,6 @@ impl<'a> Integrator<'a> {
             rule: Rule::Limit.name(),
         });
         self.begin(next, &Multiple::default())
-    }
-
-    /// Goes on on a surface that the motion has touched again and again, if it rests there.
-    #[cold]
-    fn rest_on_touched(&mut self, j: usize) -> Result<Option<Option<Stop>>, FieldError> {
-        let Some((side, x)) = self.ask(Cause::Start, |at, notes| side_of_rest(at, notes, j))?
-        else {
-            return Ok(None);
-        };
-        let before = self.run.motion.mode.clone();
-        let mut next = Next::new(before.with(j, side), Lefts::new());
-        next.left.push(Left::stays(j));
-        next.start_mut().moved = Some(x);
-        self.record(before, next.mode.clone(), &[j], Rule::Limit.name())?;
-        self.begin(next, &Multiple::default()).map(Some)
     }
 
     /// Records a switch between two modes that leaves the state as it is.
@@ -984,6 +969,24 @@ fn cling_to_surface(
     followed.transpose()
 }
 
+/// Continues on a surface that the motion has touched again and again, if it rests there.
+#[cold]
+fn rest_on_touched(
+    integrator: &mut Integrator<'_>,
+    j: usize,
+) -> Result<Option<Option<Stop>>, FieldError> {
+    let found = integrator.ask(Cause::Start, |at, notes| side_of_rest(at, notes, j))?;
+    let Some((side, x)) = found else {
+        return Ok(None);
+    };
+    let before = integrator.run.motion.mode.clone();
+    let mut next = Next::new(before.with(j, side), Lefts::new());
+    next.left.push(Left::stays(j));
+    next.start_mut().moved = Some(x);
+    integrator.record(before, next.mode.clone(), &[j], Rule::Limit.name())?;
+    integrator.begin(next, &Multiple::default()).map(Some)
+}
+
 /// How a motion goes on that is held to surfaces: if it `leaves` one, and if they hold it like roots, where that is asked for.
 fn find_clinging(
     integrator: &mut Integrator<'_>,
@@ -1003,9 +1006,9 @@ fn follow_clinging(
 ) -> Result<Option<Stop>, FieldError> {
     integrator.recorder.leave(&mut integrator.run, &[])?;
     integrator.recorder.replace();
-    let (before, mode) = (integrator.run.motion.mode.clone(), &clinging.mode);
+    let before = integrator.run.motion.mode.clone();
     let is_start = integrator.recorder.has_no_segment();
-    if is_start || *mode != before {
+    if let Some(mode) = clinging.mode.filter(|mode| is_start || *mode != before) {
         let entries = mode.entries().iter().zip(before.entries()).enumerate();
         let changed = entries.filter(|(_, (after, before))| after != before);
         let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
@@ -1017,7 +1020,7 @@ fn follow_clinging(
         let discrete = &integrator.run.motion.discrete;
         integrator
             .recorder
-            .begin_segment(t, mode, SmallVec::new(), discrete);
+            .begin_segment(t, &mode, SmallVec::new(), discrete);
     }
     for (t, x) in clinging.pieces {
         let (t0, x0) = (integrator.run.t, &integrator.run.x);
