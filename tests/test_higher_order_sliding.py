@@ -7,6 +7,7 @@ shrinks by rho = exp(-k1 pi / (4 w)), w = sqrt(k2/2 - k1**2/16), and it takes (1
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -340,3 +341,99 @@ def test_nothing_rests_that_is_only_small() -> None:
     assert (np.diff(crossings) > 0).all()
     swings = fl.solve_ivp(lambda t, x: [x[1], -np.sign(x[0])], (0, 0.1), [0.0, 1e-3], atol=1e-6)
     assert np.abs(swings.switches.y_before[:, 1]) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_slow_drift_saddles_and_roots_that_push_away_are_followed() -> None:
+    # Along the surface that is slid on.
+    drift = fl.solve_ivp(lambda t, x: [1e-12, -np.sign(x[1])], (0, 10), [0.0, 1.0])
+    assert drift.y[:, -1] == pytest.approx([1e-11, 0.0], rel=1e-9, abs=1e-15)
+    # From rounding to its size, along the unstable direction, with the other state at its target.
+    saddle = fl.solve_ivp(
+        lambda t, x: [x[0], x[2], -np.sign(x[1]) - 0.5 * np.sign(x[2])],
+        (0, 30),
+        [1e-13, 0.3, 0.0],
+        rtol=1e-9,
+        atol=1e-20,
+    )
+    assert "accumulation" in saddle.switches.kind
+    assert saddle.y[0, -1] == pytest.approx(1e-13 * math.exp(30), rel=1e-5)
+    # A slow manifold x[1] = x[0], on which x' = -1e-9 x.
+    slow = fl.solve_ivp(
+        lambda t, x: [-1e-9 * x[0], -50 * (x[1] - x[0]) - np.sign(x[1] - x[0])],
+        (0, 100),
+        [1.0, 0.0],
+        rtol=1e-9,
+    )
+    assert slow.y[:, -1] == pytest.approx([math.exp(-1e-7)] * 2, abs=1e-9)
+    # With u = sqrt(x): 2 u' = 1 + 1e-12 / u. Below atol nothing is known of x, and u to the root of it.
+    root = fl.solve_ivp(
+        lambda t, x: [1e-12 + np.sqrt(np.maximum(x[0], 0))], (0, 2), [0.0], rtol=1e-9, atol=1e-12
+    )
+    assert root.y[0, -1] == pytest.approx(1.0, abs=1e-5)
+
+
+LEVELS: dict[str, Callable[[Any], Any]] = {
+    "np.maximum": lambda h: np.sqrt(np.maximum(h, 0)),
+    "if": lambda h: np.sqrt(h) if h > 0 else 0.0,
+    "where": lambda h: np.where(h > 0, np.sqrt(np.abs(h)), 0.0),
+    "sign": lambda h: np.sign(h) * np.sqrt(np.abs(h)),
+    "abs": lambda h: np.sqrt(np.abs(h)),
+    "plain": lambda h: np.sqrt(h),
+}
+INFLOWS: dict[str, tuple[Callable[[Any], Any], list[float]]] = {
+    "none": (lambda t: 0.0, []),
+    "constant": (lambda t: 0.3, []),
+    "from 6 on": (lambda t: 0.5 if t > 6 else 0.0, [6.0]),
+    "not from 3 to 7": (lambda t: 0.0 if 3 < t < 7 else 0.4, [3.0, 7.0]),
+    "slowly from 6 on": (lambda t: 0.3 * np.maximum(t - 6, 0), [6.0]),
+    "half waves": (lambda t: np.maximum(np.sin(t), 0), [k * math.pi for k in (1, 2, 3)]),
+}
+
+
+def regularised_tanks(
+    flow: Callable[[Any], Any], breaks: list[float], start: list[float], t: Any
+) -> np.ndarray[Any, Any]:
+    """Return two tanks with the roots h / sqrt(h + 1e-10), restarted at the kinks and jumps of the inflow."""
+
+    def smooth(h: float) -> float:
+        return max(h, 0.0) / math.sqrt(max(h, 0.0) + 1e-10)
+
+    def between(begin: float, end: float) -> Callable[[float, Any], list[float]]:
+        def fun(t: float, h: Any) -> list[float]:
+            inflow = float(flow(min(max(t, begin + 1e-9), end - 1e-9)))
+            return [inflow - smooth(h[0]), smooth(h[0]) - 0.5 * smooth(h[1])]
+
+        return fun
+
+    state, parts = np.array(start), []
+    for begin, end in itertools.pairwise([0.0, *breaks, t[-1]]):
+        times = [*t[(t >= begin) & (t < end)], end]
+        run = solve_stiff(between(begin, end), (begin, end), state, "Radau", times, rtol=1e-8, atol=1e-12)
+        state = run.y[:, -1]
+        parts.append(run.y[:, :-1])
+    return np.column_stack([*parts, state])
+
+
+@pytest.mark.filterwarnings("ignore:zero_surface")
+@pytest.mark.parametrize(
+    ("level", "inflow"),
+    # With "abs" a level that falls like -(t - t0)**2 / 4 is as good a solution as that of an empty tank.
+    [pair for pair in itertools.product(LEVELS, INFLOWS) if pair != ("abs", "half waves")],
+)
+def test_tanks_of_torricelli_in_every_spelling(level: str, inflow: str) -> None:
+    root, (flow, breaks) = LEVELS[level], INFLOWS[inflow]
+    t = np.linspace(0, 12, 49)
+    for start in ([1.0, 0.2], [0.0, 0.0], [0.0, 0.5]):
+        sol = fl.solve_ivp(
+            lambda t, h: [flow(t) - root(h[0]), root(h[0]) - 0.5 * root(h[1])],
+            (0, 12),
+            start,
+            rtol=1e-8,
+            atol=1e-10,
+            max_events=1000,
+        )
+        assert sol.success, sol.message
+        assert not sol.warnings
+        assert len(sol.switches) < 40
+        reference = regularised_tanks(flow, breaks, start, t)
+        assert np.abs(sol.sol(t) - reference).max() < 2e-5

@@ -81,13 +81,14 @@ def test_relays_with_damping_alone_do_not_arrive(damping: Any) -> None:
     assert np.abs(sol.switches.y_before[~sol.switches.is_kink, 1]).min() > 1e-6
 
 
-def test_very_many_switches_in_one_place_are_named() -> None:
+@pytest.mark.parametrize("keep", ["steps", "switches", "last"])
+def test_very_many_switches_in_one_place_are_named(keep: str) -> None:
     turn = fl.System(lambda t, x: [-np.sign(x[1]), np.sign(x[0])], n=2)
-    sol = turn.solve((0, 1e3), [3e-5, 0.0], max_events=101_000)
+    sol = turn.solve((0, 1e3), [3e-5, 0.0], max_events=101_000, keep=keep)
     assert not sol.success
     assert "switches since t = " in sol.message
     assert "at x[1] = 0, x[0] = 0" in sol.message
-    few = turn.solve((0, 1e3), [3e-5, 0.0], max_events=1000)
+    few = turn.solve((0, 1e3), [3e-5, 0.0], max_events=1000, keep=keep)
     assert "switches since" not in few.message
 
 

@@ -379,7 +379,8 @@ def _solve(
             parameters, nearest = parameter_vector(values), float(np.max(options.atol))
             for ended in system.prepare_with_ends_of_roots(prepared, n, t0, state, values):
                 beyond, ending = run_of(ended, choices)
-                goes_further = beyond.status >= 0 or beyond.segments[-1][1] >= run.segments[-1][1]
+                reached, before = (each.segments[-1][1] if each.segments else t0 for each in (beyond, run))
+                goes_further = beyond.status >= 0 or reached >= before
                 stays = isinstance(beyond, Run) and ending.stays_where_roots_are(beyond, parameters, nearest)
                 if goes_further and stays:
                     run, used = beyond, ending

@@ -38,7 +38,7 @@ mod trial;
 mod viable;
 mod zero_surfaces;
 
-pub(crate) use clinging::cling;
+pub(crate) use clinging::{cling, side_of_rest, Clinging};
 pub(crate) use consistency::differs_between_sides;
 pub(crate) use decide::decide;
 pub(crate) use end_of_sliding::{end_of_sliding, lost_guards, EndOfSliding};

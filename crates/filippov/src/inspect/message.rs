@@ -5,21 +5,15 @@ use crate::record::Solution;
 use crate::status::Stop;
 use crate::system::PiecewiseSystem;
 
-/// Of so many last switches a message names the surfaces.
-const LATEST: usize = 32;
-
 /// Why a run ended, where, and what to try. `n_visible` is the number of surfaces that a user sees.
 pub fn message_of(system: &dyn PiecewiseSystem, solution: &Solution, n_visible: usize) -> String {
     let mode = solution.mode.first(n_visible);
     let (t, x) = (solution.t_last, solution.last_state());
     let name = |j| system.surface_name(j);
-    let last = solution.switches.iter().rev().take(LATEST);
-    let mut latest: Vec<usize> = last.flat_map(|s| s.surfaces.to_vec()).collect();
-    latest.sort_unstable();
-    latest.dedup();
-    let went_on = solution.stop.what_went_on(&solution.stats, &latest, name);
-    let message = solution.stop.message(t, &mode, name) + &went_on;
-    match &solution.stop {
+    let stop = &solution.stop;
+    let went_on = stop.what_went_on(&solution.stats, &solution.last_switched, name);
+    let message = stop.message(t, &mode, name) + &went_on;
+    match stop {
         Stop::NotFinite => match not_finite(system, t, x, &solution.discrete, &solution.mode) {
             Some(place) => format!("{message} {}", place.text(name)),
             None => message,

@@ -192,9 +192,12 @@ impl<'a> Integrator<'a> {
         }
         match self.attempt_step() {
             Ok(None) => Ok(self.recorder.stop_at_section()),
-            Ok(Some(stop @ (Stop::NotFinite | Stop::StepTooSmall | Stop::NoProgress { .. }))) => {
-                self.rest_or_stop(stop)
-            }
+            Ok(Some(
+                stop @ (Stop::NotFinite
+                | Stop::StepTooSmall
+                | Stop::NoProgress { .. }
+                | Stop::Intersection { .. }),
+            )) => self.rest_or_stop(stop),
             ended => ended,
         }
     }

@@ -7,10 +7,10 @@ use crate::decisions::limits::{
 };
 use crate::decisions::{
     add_vanishing_surfaces, cling, decide, differs_between_sides, end_of_sliding, goes_through,
-    landing, located_surfaces, mean_of_rounds, refusal, rest_within_tolerance, sides,
+    landing, located_surfaces, mean_of_rounds, refusal, rest_within_tolerance, side_of_rest, sides,
     triggers_reached, warn_against_direction, warn_oscillation, warn_unknown_side,
-    warn_zero_surface, zero_surfaces, Cause, Decision, EndOfSliding, Leap, Left, Lefts, Next,
-    Notes, Point, Reached, RestingPlace, Rule, Scene, Sides, Values,
+    warn_zero_surface, zero_surfaces, Cause, Clinging, Decision, EndOfSliding, Leap, Left, Lefts,
+    Next, Notes, Point, Reached, RestingPlace, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
@@ -115,9 +115,14 @@ impl<'a> Integrator<'a> {
             let touched = self.recorder.surfaces_switched_at(self.run.t);
             let is_of_higher_degree = |j| self.run.system.reduced(&[j]).is_some();
             if matches!(touched[..], [j] if is_of_higher_degree(j)) {
-                if let Some(ended) = cling_to_surface(self, true)? {
+                if let Some(ended) = cling_to_surface(self, (true, false))? {
                     return Ok(ended);
                 }
+            }
+        }
+        if let Some(j) = self.recorder.surface_touched_in_a_row() {
+            if let Some(ended) = rest_on_touched(self, j)? {
+                return Ok(ended);
             }
         }
         if !self.run.actions.list.is_empty() {
@@ -167,7 +172,16 @@ impl<'a> Integrator<'a> {
             }
         }
         let mut reached = Reached::default();
+        let n_choices = self.n_choices;
         let Decision { decided, rule } = self.decide(cause(at_two_fold), &mut reached)?;
+        if self.n_choices > n_choices {
+            // A root that holds the motion leaves no choice: beside it the fields are as rounding has them.
+            if let Some(clinging) = find_clinging(self, (true, true))? {
+                forget_choices(self);
+                self.n_choices = n_choices;
+                return follow_clinging(self, clinging);
+            }
+        }
         let Reached { surfaces, before } = reached;
         self.run.residuals.clear();
         let mut next = match decided {
@@ -207,6 +221,12 @@ impl<'a> Integrator<'a> {
                     false => self.slacks.clear(),
                 }
             }
+        }
+        if self
+            .recorder
+            .repeats_touch(self.run.t, (&before, &next.mode), &concerned)
+        {
+            return self.begin(next, &event.multiple);
         }
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
@@ -255,8 +275,14 @@ impl<'a> Integrator<'a> {
         if !is_first || self.held.is_some() || self.watch.has_ended() {
             return Ok(Some(stop));
         }
-        let Some(rest) = self.ask(Cause::Start, rest_within_tolerance)? else {
-            return Ok(cling_to_surface(self, false)?.unwrap_or(Some(stop)));
+        let only_roots = matches!(stop, Stop::Intersection { .. });
+        let rest = match only_roots {
+            // The decision has asked for it.
+            true => None,
+            false => self.ask(Cause::Start, rest_within_tolerance)?,
+        };
+        let Some(rest) = rest else {
+            return Ok(cling_to_surface(self, (false, only_roots))?.unwrap_or(Some(stop)));
         };
         forget_choices(self);
         let RestingPlace { x, surfaces, next } = rest;
@@ -536,6 +562,7 @@ impl<'a> Integrator<'a> {
         }
         match self.decide(Cause::Start, &mut Reached::default())?.decided {
             Ok(next) => self.begin(next, &Multiple::default()),
+            Err(stop @ Stop::Intersection { .. }) => self.rest_or_stop(stop),
             Err(stop) => Ok(Some(stop)),
         }
     }
@@ -935,30 +962,81 @@ impl<'a> Integrator<'a> {
 #[cold]
 fn cling_to_surface(
     integrator: &mut Integrator<'_>,
-    leaves: bool,
+    (leaves, only_roots): (bool, bool),
 ) -> Result<Option<Option<Stop>>, FieldError> {
-    let horizon = integrator.horizon;
-    let found = integrator.ask(Cause::Start, |at, notes| cling(at, notes, horizon))?;
-    let Some(clinging) = found.filter(|found| found.leaves || !leaves) else {
+    let found = find_clinging(integrator, (leaves, only_roots))?;
+    let followed = found.map(|clinging| follow_clinging(integrator, clinging));
+    followed.transpose()
+}
+
+/// Continues on a surface that the motion has touched again and again, if it rests there.
+#[cold]
+fn rest_on_touched(
+    integrator: &mut Integrator<'_>,
+    j: usize,
+) -> Result<Option<Option<Stop>>, FieldError> {
+    let found = integrator.ask(Cause::Start, |at, notes| side_of_rest(at, notes, j))?;
+    let Some((side, x)) = found else {
         return Ok(None);
     };
+    let before = integrator.run.motion.mode.clone();
+    let mut next = Next::new(before.with(j, side), Lefts::new());
+    next.left.push(Left::stays(j));
+    next.start_mut().moved = Some(x);
+    integrator.record(before, next.mode.clone(), &[j], Rule::Limit.name())?;
+    integrator.begin(next, &Multiple::default()).map(Some)
+}
+
+/// How a motion goes on that is held to surfaces: if it `leaves` one, and if they hold it like roots, where that is asked for.
+fn find_clinging(
+    integrator: &mut Integrator<'_>,
+    (leaves, only_roots): (bool, bool),
+) -> Result<Option<Clinging>, FieldError> {
+    let horizon = integrator.horizon;
+    let found = integrator.ask(Cause::Start, |at, notes| {
+        cling(at, notes, only_roots, horizon)
+    })?;
+    Ok(found.filter(|found| found.leaves || !leaves))
+}
+
+/// Records the way of a motion that is held to surfaces, and decides what follows.
+fn follow_clinging(
+    integrator: &mut Integrator<'_>,
+    clinging: Clinging,
+) -> Result<Option<Stop>, FieldError> {
     integrator.recorder.leave(&mut integrator.run, &[])?;
     integrator.recorder.replace();
+    let before = integrator.run.motion.mode.clone();
+    let is_start = integrator.recorder.has_no_segment();
+    if let Some(mode) = clinging.mode.filter(|mode| is_start || *mode != before) {
+        let entries = mode.entries().iter().zip(before.entries()).enumerate();
+        let changed = entries.filter(|(_, (after, before))| after != before);
+        let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
+        let (system, t) = (integrator.run.system, integrator.run.t);
+        integrator.run.motion.restart(system, t, mode.clone(), &[]);
+        if !is_start {
+            integrator.record(before, mode.clone(), &changed, Rule::Limit.name())?;
+        }
+        let discrete = &integrator.run.motion.discrete;
+        integrator
+            .recorder
+            .begin_segment(t, &mode, SmallVec::new(), discrete);
+    }
     for (t, x) in clinging.pieces {
         let (t0, x0) = (integrator.run.t, &integrator.run.x);
         integrator.stepper.set_straight(t0, t - t0, x0, &x);
         let (mut search, recorder) = integrator.step_search();
         let Some(zeros) = recorder.find_user_zeros(&mut search, 1.0, t)? else {
-            let surfaces = vec![clinging.surface];
-            return Ok(Some(Some(Stop::NoProgress { surfaces })));
+            let surfaces = clinging.surfaces;
+            return Ok(Some(Stop::NoProgress { surfaces }));
         };
         if let Some(stop) = recorder.record_user_zeros(&mut search, zeros, (1.0, t))? {
-            return Ok(Some(Some(stop)));
+            return Ok(Some(stop));
         }
         integrator.move_straight(t, x)?;
     }
     integrator.control.forget_proposal();
-    integrator.go_on_from_here(&[]).map(Some)
+    integrator.go_on_from_here(&[])
 }
 
 /// Forgets the choices since time last went on: the motion has come back at once, whatever was chosen.

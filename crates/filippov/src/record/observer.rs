@@ -253,6 +253,11 @@ impl<'a> Observed<'a> {
         self.replaces = true;
     }
 
+    /// Nothing has happened: the motion goes on.
+    pub fn stay(&mut self) {
+        self.has_ended = false;
+    }
+
     /// The run ends. In an instant no motion follows: that of the mode before stands for it.
     pub fn end(&mut self, run: &mut Run) {
         if self.has_ended {

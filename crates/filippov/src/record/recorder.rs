@@ -13,10 +13,15 @@ use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::{Interpolant, Steppers};
 use crate::switch::{Kind, Switch};
-use crate::tolerances::{EPS, LATEST_SWITCHES, MOST_TOUCHES_AT_ONE_TIME, SAME_TICK};
+use crate::tolerances::{
+    EPS, LATEST_SWITCHES, MOST_TOUCHES_AT_ONE_TIME, MOST_TOUCHES_IN_A_ROW, SAME_TICK,
+};
 
 /// Room that is made at once for so many steps and switches: more of them take more room then.
 const USUAL_LENGTH: usize = 64;
+
+/// Of so many last switches a message names the surfaces.
+const SWITCHES_NAMED: usize = 32;
 
 /// Keeps what a run produces, as far as it is wanted.
 ///
@@ -32,6 +37,8 @@ pub(crate) struct Recorder<'a> {
     coefficients: Vec<f64>,
     segments: Vec<Segment>,
     switches: Vec<Switch>,
+    /// How often the last of them, a touch, was repeated without any progress of time.
+    n_repeated: usize,
     /// The last jump of the state.
     jump: Option<(f64, Vec<f64>)>,
     /// Wanted times that are sampled as the run goes on, the next one first.
@@ -64,6 +71,7 @@ impl<'a> Recorder<'a> {
             coefficients: Vec::new(),
             segments: Vec::with_capacity(room),
             switches: Vec::with_capacity(room),
+            n_repeated: 0,
             jump: None,
             is_sampled: wanted.is_some(),
             wanted: wanted.unwrap_or_default(),
@@ -202,6 +210,11 @@ impl<'a> Recorder<'a> {
         });
     }
 
+    /// Has no motion begun?
+    pub fn has_no_segment(&self) -> bool {
+        self.segments.is_empty()
+    }
+
     fn close_segment(&mut self, t: f64) {
         let n_steps = self.steps.len();
         if let Some(segment) = self.segments.last_mut() {
@@ -336,6 +349,7 @@ impl<'a> Recorder<'a> {
         if let Some(visits) = &mut self.visits {
             visits.switched(&switch);
         }
+        self.n_repeated = 0;
         self.switches.push(switch);
     }
 
@@ -357,7 +371,42 @@ impl<'a> Recorder<'a> {
     pub fn only_touches_at(&self, t: f64) -> bool {
         let latest = self.switches.iter().rev();
         let touches = latest.take_while(|s| s.t == t && s.kind == Kind::Grazing);
-        touches.take(MOST_TOUCHES_AT_ONE_TIME).count() == MOST_TOUCHES_AT_ONE_TIME
+        let recorded = touches.take(MOST_TOUCHES_AT_ONE_TIME).count();
+        recorded > 0 && recorded + self.n_repeated >= MOST_TOUCHES_AT_ONE_TIME
+    }
+
+    /// Is a switch between these modes, at these surfaces, the touch that was recorded last? Then nothing happens.
+    pub fn repeats_touch(
+        &mut self,
+        t: f64,
+        (before, after): (&Mode, &Mode),
+        surfaces: &[usize],
+    ) -> bool {
+        let is_same = |last: &Switch| {
+            last.kind == Kind::Grazing
+                && last.t == t
+                && last.mode_after == *after
+                && last.surfaces[..] == *surfaces
+        };
+        let repeats = before == after && self.switches.last().is_some_and(is_same);
+        if repeats {
+            self.n_repeated += 1;
+            if let Some(observed) = &mut self.observed {
+                observed.stay();
+            }
+        }
+        repeats
+    }
+
+    /// The surface that the last switches have touched, if they are so many touches of it that it may be at rest there.
+    pub fn surface_touched_in_a_row(&self) -> Option<usize> {
+        let &[j] = &self.switches.last()?.surfaces[..] else {
+            return None;
+        };
+        let latest = self.switches.iter().rev();
+        let touches = latest.take_while(|s| s.kind == Kind::Grazing && s.surfaces[..] == [j]);
+        let recorded = touches.take(MOST_TOUCHES_IN_A_ROW).count();
+        (recorded + self.n_repeated >= MOST_TOUCHES_IN_A_ROW).then_some(j)
     }
 
     /// Makes the switches, if they are wanted, and the ends the points of the result.
@@ -396,6 +445,12 @@ impl<'a> Recorder<'a> {
         } else if self.keep != Keep::Steps {
             self.list_switches(t_last, x);
         }
+        let mut last_switched: Vec<usize> = Vec::new();
+        for switch in self.switches.iter().rev().take(SWITCHES_NAMED) {
+            last_switched.extend(&switch.surfaces);
+        }
+        last_switched.sort_unstable();
+        last_switched.dedup();
         if self.keep == Keep::Last {
             self.switches.clear();
         }
@@ -429,6 +484,7 @@ impl<'a> Recorder<'a> {
             decisions: self.decisions,
             y0: self.y0,
             y_last: x.to_vec(),
+            last_switched,
         }
     }
 }

@@ -61,6 +61,9 @@ pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 /// After so many touches without any progress of time a root that holds the motion to its surface is looked for.
 pub const MOST_TOUCHES_AT_ONE_TIME: usize = 3;
 
+/// After so many touches of one surface, one after the other, it is asked whether the motion rests there.
+pub const MOST_TOUCHES_IN_A_ROW: usize = 8;
+
 /// So many switches in one place are worth a word: a run that goes on in time makes as many in many places.
 pub const MANY_SWITCHES: u64 = 100_000;
 

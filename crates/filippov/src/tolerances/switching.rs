@@ -130,6 +130,10 @@ pub const STEPS_BESIDE_REST: usize = 6;
 /// A motion that a root holds to a surface is followed there up to so many tolerances at most: it leaves beyond the first.
 pub const MOST_CLINGING: f64 = 4.0;
 
+/// So near to its surface, in tolerances, a function that holds a motion like a root falls by more than twice this part of its fall over
+/// one tolerance.
+pub const CLOSE_TO_ROOT: f64 = 1.0 / 16.0;
+
 /// How far such a motion may bend away from the straight lines that are recorded, in tolerances.
 pub const BEND_OF_CLINGING: f64 = 0.25;
 
