@@ -253,9 +253,9 @@ def test_forms_of_one_relay_agree() -> None:
 
 
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
-@pytest.mark.parametrize("unit", [1e-200, 1e-100, 1e-50, 1e-20, 1e-12, 1e12, 1e20, 1e50, 1e100, 1e150])
+@pytest.mark.parametrize("unit", [1e-100, 1e-50, 1e-20, 1e-12, 1e12, 1e17, 1e22, 1e25, 1e50, 1e100, 1e150])
 def test_the_itinerary_does_not_depend_on_the_unit_of_time(unit: float, method: str) -> None:
-    """In units above these a second derivative in time is zero."""
+    """In units beyond these a second derivative in time is no number, or zero."""
 
     def run(unit: float) -> fl.Solution:
         def fun(t: float, x: Any) -> Any:
