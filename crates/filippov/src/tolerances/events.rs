@@ -152,7 +152,10 @@ pub const MOST_SLID_ON_AT_KINK: usize = 8;
 
 /// Where the sign of a user's function behind a zero is looked at, in shares of the piece that is searched: near, and farther
 /// from a double zero, where its values are within rounding for the square root of that.
-pub const SHARES_BEHIND_ZERO: [f64; 3] = [1e-7, 1e-5, 1e-3];
+pub const SHARES_BEHIND_ZERO: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
+
+/// As [`BOUNDS_DEPTH`], for a user's function: beside a root inside of it two of its zeros may be this near to the root.
+pub const BOUNDS_DEPTH_BESIDE_ROOT: u32 = 32;
 
 /// A zero of a user's function this near to a kink or a jump, in shares of the piece before it, counts only if the sign changes
 /// clear of rounding on the way there: a root such as sqrt(|u|) is zero where u is within rounding of zero.

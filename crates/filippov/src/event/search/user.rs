@@ -435,18 +435,17 @@ impl StepSearch<'_, '_> {
     /// The sign behind a zero, where it is clear of rounding, and how far behind: nearer to a multiple zero, or to one of a steep
     /// root, rounding decides.
     fn sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<(f64, f64), FieldError> {
-        let mut nearest = 0.0;
         // The zero itself is known up to the rounding of time.
         let least = self.together(self.stepper.interpolant().dt);
+        let mut behind = 0.0;
         for share in SHARES_BEHIND_ZERO {
-            let behind = (share * (to - from)).max(least.min(0.25 * (to - from)));
+            behind = (share * (to - from)).max(least.min(0.25 * (to - from)));
             let value = along.value(self, from + behind)?;
             if value.abs() > along.rounding(self, from + behind) {
                 return Ok((sign_of(value), behind));
             }
-            nearest = if nearest == 0.0 { value } else { nearest };
         }
-        Ok((sign_of(nearest), 0.0))
+        Ok((0.0, behind))
     }
 
     /// The ends of the pieces that are searched one after the other, the first one last: a function without bounds is

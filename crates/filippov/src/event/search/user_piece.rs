@@ -16,7 +16,7 @@ use crate::mode::Signs;
 use crate::motion::CurrentMotion;
 use crate::stepper::{powers_of_nested, shift, Basis, Interpolant};
 use crate::system::Setting;
-use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH, EPS, POLE, ROUNDING};
+use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH_BESIDE_ROOT, EPS, POLE, ROUNDING};
 
 /// The value of a user's function along the motion.
 pub(super) fn value_along(
@@ -307,7 +307,7 @@ impl StepSearch<'_, '_> {
         let evidence = Evidence::Bounds {
             bounds: &mut bounds,
             divided: i32::from(divided),
-            patience: BOUNDS_DEPTH,
+            patience: BOUNDS_DEPTH_BESIDE_ROOT,
         };
         // Rounding of a function whose terms are not known: that of its values.
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
