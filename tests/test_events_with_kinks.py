@@ -242,3 +242,20 @@ def test_a_floor_of_a_root_that_begins_at_the_start_changes_in_a_long_step(metho
             first_step=4.0,
         )
         assert sol.t_events[0] == pytest.approx([0.5625], abs=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_zeros_on_both_sides_of_a_steep_root_are_found_once(method: str) -> None:
+    level = 0.04
+    zeros = [(1 - np.sqrt(0.7 + side * level**8)) / 0.15 for side in (1, -1)]
+    for rtol in (1e-4, 1e-7, 1e-10):
+        sol = fl.solve_ivp(
+            lambda t, x: [-0.15],
+            (0, 4),
+            [1.0],
+            events=lambda t, x: np.sqrt(np.sqrt(np.sqrt(np.abs(x[0] ** 2 - 0.7)))) - level,
+            method=method,
+            rtol=rtol,
+            atol=rtol,
+        )
+        assert sol.t_events[0] == pytest.approx(zeros, abs=1e-12)

@@ -238,7 +238,7 @@ impl StepSearch<'_, '_> {
         // A root that begins here may not exist a rounding error before.
         let sign = match is_zero || value.is_nan() {
             true if to == from => 0.0,
-            true => sign_of(along.value(self, from + 1e-7 * (to - from))?),
+            true => self.first_sign_behind(along, from, to)?,
             false => sign_of(value),
         };
         let sign = if sign == 0.0 { before.before } else { sign };
@@ -430,6 +430,20 @@ impl StepSearch<'_, '_> {
             }
         }
         Ok(false)
+    }
+
+    /// The sign of a function that is zero where it is entered, or is not defined there, as near behind as it is clear of rounding.
+    fn first_sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<f64, FieldError> {
+        let last = 1e-7 * (to - from);
+        let mut behind = self.together(self.stepper.interpolant().dt);
+        while behind < last {
+            let value = along.value(self, from + behind)?;
+            if value.abs() > along.rounding(self, from + behind) {
+                return Ok(sign_of(value));
+            }
+            behind *= 8.0;
+        }
+        Ok(sign_of(along.value(self, from + last)?))
     }
 
     /// The sign behind a zero, where it is clear of rounding, and how far behind: nearer to a multiple zero, or to one of a steep
