@@ -204,21 +204,23 @@ def check_event(seed: int) -> Outcome:
     return Outcome("same")
 
 
-def run_many(check_seed: Callable[[int], Outcome], description: str) -> None:
+def run_many(check_seed: Callable[[int], Outcome | list[Outcome]], description: str) -> None:
     """Check as many seeds as the command line says, in several processes; list what differs or stops."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--n", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.n)
     kinds: Counter[str] = Counter()
-    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
-        for seed, outcome in zip(seeds, pool.imap(check_seed, seeds, chunksize=20), strict=True):
-            kinds[outcome.kind] += 1
-            if outcome.kind.startswith(("different", "stopped")):
-                print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
-            elif outcome.kind == "refused":
-                kinds[f"refused: {outcome.reason[:60]}"] += 1
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        for seed, result in zip(seeds, pool.imap(check_seed, seeds, chunksize=20), strict=True):
+            for outcome in [result] if isinstance(result, Outcome) else result:
+                kinds[outcome.kind] += 1
+                if outcome.kind.startswith(("different", "stopped")):
+                    print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
+                elif outcome.kind == "refused":
+                    kinds[f"refused: {outcome.reason[:60]}"] += 1
     for kind, count in kinds.most_common(25):
         print(f"{count:8d} {kind}")
 

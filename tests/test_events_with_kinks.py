@@ -212,3 +212,50 @@ def test_a_jump_to_the_beginning_of_a_root_is_a_zero(of, method):
         )
         assert sol.t_events[0][0] == pytest.approx((place + 0.2) / 0.7, abs=1e-9)
         assert len(sol.t_events[0]) == 2
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_floor_that_a_root_touches_has_no_zero_there(method: str) -> None:
+    """Within rounding of the zero of the logarithm its root is zero, and the floor of it another one."""
+
+    def event(t: float, x: Any) -> Any:
+        return np.sqrt(np.abs(np.log(0.2 + np.abs(x[0])))) % 0.5 - 0.07
+
+    places = np.exp([-(0.07**2), 0.07**2, 0.25, 0.57**2]) - 0.2
+    for start, rtol in [(-0.77, 1e-4), (-0.77177, 1e-7), (-0.75, 1e-10)]:
+        sol = fl.solve_ivp(
+            lambda t, x: [-1.0], (0, 0.5), [start], events=event, method=method, rtol=rtol, atol=rtol
+        )
+        assert sol.t_events[0] == pytest.approx(places + start, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_floor_of_a_root_that_begins_at_the_start_changes_in_a_long_step(method: str) -> None:
+    """A root has no bounds where it begins: that says nothing about its zeros farther on."""
+    for of in (lambda t: np.sqrt(np.abs(t)), lambda t: np.sqrt(np.maximum(t, 0))):
+        sol = fl.solve_ivp(
+            lambda t, x: [1.0],
+            (0, 4),
+            [0.0],
+            events=lambda t, x, of=of: np.rint(2 * of(t)) - 1.5,
+            method=method,
+            first_step=4.0,
+        )
+        assert sol.t_events[0] == pytest.approx([0.5625], abs=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_zeros_on_both_sides_of_a_steep_root_are_found_once(method: str) -> None:
+    level = 0.04
+    zeros = [(1 - np.sqrt(0.7 + side * level**8)) / 0.15 for side in (1, -1)]
+    for rtol in (1e-4, 1e-7, 1e-10):
+        sol = fl.solve_ivp(
+            lambda t, x: [-0.15],
+            (0, 4),
+            [1.0],
+            events=lambda t, x: np.sqrt(np.sqrt(np.sqrt(np.abs(x[0] ** 2 - 0.7)))) - level,
+            method=method,
+            rtol=rtol,
+            atol=rtol,
+        )
+        assert sol.t_events[0] == pytest.approx(zeros, abs=1e-12)

@@ -250,3 +250,21 @@ def test_forms_of_one_relay_agree() -> None:
     assert len(first.switches) > 10
     for other in others:
         assert_same(other, first)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
+@pytest.mark.parametrize("unit", [1e-100, 1e-50, 1e-20, 1e-12, 1e12, 1e17, 1e22, 1e25, 1e50, 1e100, 1e150])
+def test_the_itinerary_does_not_depend_on_the_unit_of_time(unit: float, method: str) -> None:
+    """In units beyond these a second derivative in time is no number, or zero."""
+
+    def run(unit: float) -> fl.Solution:
+        def fun(t: float, x: Any) -> Any:
+            return [x[1] / unit, (np.sin(1.3 * t / unit) - x[0] - 0.4 * np.sign(x[1] - 0.2)) / unit]
+
+        return fl.solve_ivp(fun, (0, 20 * unit), [0.0, 0.0], method=method)
+
+    expected, sol = run(1.0), run(unit)
+    assert sol.success, sol.message
+    assert [str(mode) for mode in sol.segments.mode] == [str(mode) for mode in expected.segments.mode]
+    np.testing.assert_allclose(sol.switches.t / unit, expected.switches.t, rtol=2e-6)
+    np.testing.assert_allclose(sol.y[:, -1], expected.y[:, -1], rtol=0, atol=2e-5)

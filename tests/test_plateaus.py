@@ -59,6 +59,7 @@ COMPARISONS: dict[str, tuple[Condition, float]] = {
     "product with ramp": (lambda x: (x + 1) * np.maximum(x - 1, 0) > 0, 1.5),
     "two ramps": (lambda x: np.maximum(x - 1, 0) + np.maximum(x - 2, 0) > 0, 1.5),
     "rint": (lambda x: np.rint(x) >= 1, 2.0),
+    "floor > 0, as where": (lambda x: np.where(np.floor(x) > 0, 1, 0), 1.5),
     "clock and sign": (lambda x: np.floor(x / 1.25) + 0.5 * np.sign(x - 0.5) > 0.5, 1.25),
 }
 
@@ -149,6 +150,12 @@ SIGNS: dict[str, tuple[Condition, Condition, float, float]] = {
         lambda x: np.where(x > 1, 1.0, np.where(x < 0, -1.0, 0.0)),
         -1.0,
         0.0,
+    ),
+    "rounded beside a half": (
+        lambda x: np.abs(np.sign(np.rint(0.31 * x + 0.27))),
+        lambda x: np.where(abs(0.31 * x + 0.27) > 0.5, 1.0, 0.0),
+        -1.41,
+        1.59 - 0.23 / 0.31,
     ),
     "rounded": (
         lambda x: np.abs(np.sign(np.rint(0.5 * x))),
@@ -295,6 +302,28 @@ def test_the_plateau_of_a_sign_that_nothing_reads_is_not_refused() -> None:
             -1.0,
         ),
         (lambda x: np.ceil(np.floor(x)), np.floor, -2.0, 5.0, 0.0),
+        (lambda x: np.floor(np.rint(x)), np.rint, -2.0, 5.0, 2.5),
+        (lambda x: np.floor(x) % 3, lambda x: np.floor(x) - 3 * np.floor(x / 3), -2.0, 5.0, 6.0),
+        (lambda x: np.floor(np.floor(x) / 2), lambda x: np.floor(x / 2), -2.0, 5.0, -1.0),
+        (lambda x: np.floor(2 * x) // 4, lambda x: np.floor(x / 2), -2.0, 5.0, -1.0),
+        (lambda x: np.sign(x) % 1.5, lambda x: np.where(x > 0, 1.0, 0.5), -2.0, 5.0, 4.0),
+        (lambda x: np.floor(2.5 * np.heaviside(x, 0.5)), lambda x: np.where(x > 0, 2, 0), -2.0, 5.0, 6.0),
+        (lambda x: np.rint(x) % 2, lambda x: np.rint(x) - 2 * np.floor(np.rint(x) / 2), -2.0, 5.0, 2.5),
+        (
+            lambda x: (np.floor(10 * x) % 10) / 10,
+            lambda x: np.floor(10 * x) / 10 - np.floor(x),
+            -2.0,
+            5.0,
+            2.25,
+        ),
+        (lambda x: (np.floor(2 * x) / 2) % 1, lambda x: 0.5 * (np.floor(2 * x) % 2), 0.1, 5.0, 1.25),
+        (
+            lambda x: np.where(np.floor(x) % 2 < 0.5, 1, 0),
+            lambda x: 1 - np.floor(x) % 2,
+            -2.0,
+            5.0,
+            3.0,
+        ),
     ],
 )
 def test_a_quantiser_of_what_jumps(

@@ -32,6 +32,12 @@ POLES: dict[str, tuple[Callable[[Any], Any], list[float]]] = {
     "quotient of quotients": (lambda v: (1 + 1 / (v - 3.0)) / (2 - v), [3.0]),
     "power": (lambda v: (v - 1.5) ** -3 - 8.0, [1.5, 2.0]),
     "of an absolute value": (lambda v: 1 / np.abs(v - 1.0) - 4.0, [0.75, 1.25]),
+    "angle of a reciprocal": (lambda v: np.arctan(1 / (v - 1.3)) - 0.2, [1.3, 1.3 + 1 / np.tan(0.2)]),
+    "bounded function of a quotient": (lambda v: 0.5 - np.tanh(v / (v - 2.2)), [2.2]),
+    "exponential of a reciprocal": (
+        lambda v: np.exp(0.01 / (v - 1.3)) - 2.0,
+        [1.3, 1.3 + 0.01 / np.log(2.0)],
+    ),
     "product": (lambda v: (v - 5.0) * np.tan(v / 2), [0.0, PI, 5.0, 2 * PI]),
 }
 

@@ -130,3 +130,53 @@ def test_an_argument_that_stays_clear_of_the_end_of_a_domain_raises_no_doubt(
         warnings.simplefilter("error")
         sol = fl.solve_ivp(lambda t, x: [1.0 if of(x[0]) > level else 0.5], (0, 6), [-0.5])
     assert sol.switches.t == pytest.approx([1.0, 1.0 + 2 * place], abs=1e-12)
+
+
+COMPARED: dict[str, tuple[Callable[[Any], Any], float, float, float]] = {
+    # A comparison, the start, the rate, and for how long of 4 it holds.
+    "logarithm of a limited state": (lambda x: np.log(np.maximum(x, 0.1)) > -1, -2.0, 1.0, 2 - math.exp(-1)),
+    "logarithm of a sum": (lambda x: np.log(1 + 2 * abs(x)) > 1, -2.0, 1.0, 4 - (math.e - 1)),
+    "power of a size": (lambda x: abs(x) ** 1.5 > 1, -2.0, 1.0, 2.0),
+    "logarithm that is compared with its least value": (lambda x: np.log(x) > -1, 1.0, -0.1, 4.0),
+    "root": (lambda x: np.sqrt(x) > 0.8, 1.0, -0.1, 3.6),
+    "power 1/2": (lambda x: x**0.5 > 0.8, 1.0, -0.1, 3.6),
+    "angle": (lambda x: np.arccos(x) > 0.5, 1.0, -0.1, 4 - 10 * (1 - math.cos(0.5))),
+    "root of a circle": (lambda x: np.sqrt(1 - x**2) > 0.6, 1.0, -0.1, 2.0),
+    "root of a wide circle": (lambda x: np.sqrt(9 - x**2) > 2.9, 1.0, -0.1, 4 - 10 * (1 - math.sqrt(0.59))),
+    "choice by a logarithm": (
+        lambda x: np.where(np.log(x) > -1 / 4, 1, 0),
+        1.0,
+        -0.1,
+        10 - 10 * math.exp(-1 / 4),
+    ),
+    "logarithm of a quotient": (lambda x: np.log(x / (1.5 - x)) > 0, 1.0, -0.1, 2.5),
+    "small reciprocal": (lambda x: 1 / np.abs(x - 0.3) > 100, -2.0, 1.0, 0.02),
+    "small logarithm": (lambda x: np.log(1e-9 + abs(x - 0.3)) < math.log(0.01), -2.0, 1.0, 0.02 - 2e-9),
+    "small cube root": (lambda x: abs(np.cbrt(x - 0.3)) < 0.1, -2.0, 1.0, 0.002),
+}
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+@pytest.mark.parametrize("name", COMPARED)
+def test_a_function_is_compared_where_it_is_defined(name: str, method: Any) -> None:
+    condition, start, rate, exact = COMPARED[name]
+    for max_step in (math.inf, 0.05):
+        sol = fl.solve_ivp(
+            lambda t, x: [rate, 1.0 * condition(x[0])],
+            (0, 4),
+            [start, 0.0],
+            method=method,
+            max_step=max_step,
+        )
+        assert sol.success, sol.message
+        assert sol.y[1, -1] == pytest.approx(exact, abs=1e-8)
+
+
+@pytest.mark.parametrize("start", [1.3, 1.9, -1.3])
+def test_a_layer_of_a_root_has_no_time_that_is_not_a_number(start: float) -> None:
+    sol = fl.solve_ivp(
+        lambda t, x: [-1.0, np.where(np.sqrt(np.abs(x[0])) > 0.1, 0.0, 1.0)], (0, 3.5), [start, 0.0]
+    )
+    assert sol.success, sol.message
+    assert np.isfinite(sol.t).all()
+    assert sol.y[1, -1] == pytest.approx(0.02 if start > 0 else 0.0, abs=1e-12)

@@ -150,10 +150,10 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
                 graph.mul(square, sum)
             }
         },
-        // A power above 1 is smooth enough, and its inverse a root.
-        Inverse::Power(p) if p < 1.0 && graph.facts(sum).varies => return None,
         Inverse::Power(p) => match power_of_root(graph, &rest, p) {
             Some(power) => power,
+            // A power above 1 is smooth enough, and its inverse a root.
+            None if p < 1.0 && graph.facts(sum).varies => return None,
             None => odd_power(graph, &rest, sum, p)?,
         },
         Inverse::Exponential(base) => {
@@ -189,6 +189,10 @@ fn power_of_root(graph: &mut Graph, form: &LinearForm, p: f64) -> Option<NodeId>
         }
         _ => return None,
     };
+    // No root is made of a power above 1.
+    if p < 1.0 && exponent < 1.0 {
+        return None;
+    }
     let factor = graph.constant(k.abs().powf(p).copysign(k));
     let power = match exponent == 1.0 {
         true => base,

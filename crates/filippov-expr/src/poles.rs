@@ -1,5 +1,7 @@
 //! Poles of switching functions: N/D changes its sign where D vanishes, too. So does N D, which is smooth there.
 
+use std::f64::consts::FRAC_PI_2;
+
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
@@ -26,6 +28,9 @@ struct Fractions<'g> {
 
 /// An expression with the same sign, without the poles of quotients and tangents; `None` if there are none, or too many.
 pub(crate) fn without_poles(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
+    if let Some(inner) = inside_of_monotone(graph, id) {
+        return without_poles(graph, inner);
+    }
     let nodes = graph.reachable_by([id], |id| terms_and_factors(graph, id));
     let n_poles = nodes.iter().filter(|&&id| has_pole(graph, id)).count();
     if n_poles == 0 || n_poles > MOST_DENOMINATORS {
@@ -49,6 +54,32 @@ pub(crate) fn without_poles(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
         Some(Switching::Constant(1.0)) => numerator,
         Some(Switching::Constant(-1.0)) => graph.neg(numerator),
         _ => graph.mul(numerator, denominator),
+    })
+}
+
+/// `atan(u) - c` has the sign of `u - tan(c)`, which is a quotient where u is one; likewise for other increasing functions that
+/// are bounded where u is infinite.
+fn inside_of_monotone(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
+    let form = LinearForm::of(graph, id);
+    let (atom, coefficient) = form
+        .terms
+        .first()
+        .copied()
+        .filter(|_| form.terms.len() == 1)?;
+    let Node::Unary(function, inner) = *graph.node(atom) else {
+        return None;
+    };
+    let level = -form.constant / coefficient;
+    let level = match function {
+        UnaryOp::Atan if level.abs() < FRAC_PI_2 => level.tan(),
+        UnaryOp::Tanh if level.abs() < 1.0 => level.atanh(),
+        UnaryOp::Exp if level > 0.0 => level.ln(),
+        _ => return None,
+    };
+    let level = graph.constant(level);
+    Some(match coefficient > 0.0 {
+        true => graph.sub(inner, level),
+        false => graph.sub(level, inner),
     })
 }
 

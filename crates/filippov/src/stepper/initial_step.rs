@@ -4,7 +4,7 @@ use super::ErrorScale;
 use crate::error::FieldError;
 use crate::motion::SmoothField;
 use crate::powers::power;
-use crate::tolerances::SMALLEST_GUESS;
+use crate::tolerances::{EPS, GUESS_ROUNDINGS, SMALLEST_GUESS};
 
 /// Hairer's guess of the first step of a method of order 5, from two derivatives.
 ///
@@ -27,7 +27,8 @@ pub fn initial_step(
     } else {
         0.01 * d0 / d1
     };
-    let guess = guess.max(SMALLEST_GUESS).min(longest);
+    let shortest = shortest_guess(t);
+    let guess = guess.max(shortest).min(longest);
     let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + guess * dy).collect();
     let mut dy_moved = vec![0.0; y.len()];
     field.eval(t + guess, &mut moved, &mut dy_moved)?;
@@ -42,7 +43,7 @@ pub fn initial_step(
     } else {
         power(0.01 / fastest, 0.2)
     };
-    let step = step.min(100.0 * guess).max(SMALLEST_GUESS);
+    let step = step.min(100.0 * guess).max(shortest);
     Ok(step.min(longest))
 }
 
@@ -77,7 +78,12 @@ pub fn restart_step(
     if !fastest.is_finite() || fastest <= 1e-15 {
         return Ok(proposal);
     }
-    Ok(proposal.min(power(0.1 / fastest, 0.2)))
+    Ok(proposal.min(power(0.1 / fastest, 0.2).max(shortest_guess(t))))
+}
+
+/// The shortest first step that is guessed: in large units of time Hairer's rules would fall below the rounding of the time.
+fn shortest_guess(t: f64) -> f64 {
+    SMALLEST_GUESS.max(GUESS_ROUNDINGS * EPS * t.abs())
 }
 
 /// As the guess of [`initial_step`] without its evaluation, and aiming at a thousandth of the tolerance

@@ -73,6 +73,7 @@ impl Taylor {
                 return f64::NAN;
             }
             longest = longest.min(match terms {
+                [(0.0, _), (0.0, _)] if self.has_underflow(place) => return f64::NAN,
                 [(0.0, _), (0.0, _)] => self.longest_for_polynomial(options, place),
                 _ => reach_of(terms.map(|(c, k)| (c / size, k))),
             });

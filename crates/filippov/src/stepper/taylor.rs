@@ -12,7 +12,7 @@ use crate::powers::power;
 use crate::system::MotionJets;
 use crate::tolerances::{
     ERRORS_OF_STEPS, TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP,
-    TAYLOR_ORDER_DEAR, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
+    TAYLOR_ORDER_DEAR, TAYLOR_SLOW, TAYLOR_UNDERFLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
 };
 
 /// The series of the present motion.
@@ -108,7 +108,7 @@ impl Taylor {
     }
 
     /// Takes the coefficients at the start `y` of a step, rows of `width`, that `fill` writes; returns the length
-    /// of step that they allow, NaN if they are not finite.
+    /// of step that they allow, NaN if they are not finite or too small to be told from zero.
     #[inline(always)]
     pub fn expand(
         &mut self,
@@ -168,7 +168,17 @@ impl Taylor {
         }
         let size = |k: usize| ERRORS_OF_STEPS * scale.largest(self.row(k), y);
         let longest = reach([self.order, self.order - 1].map(|k| (size(k), k)));
-        longest.min(self.wary.unwrap_or(f64::INFINITY))
+        let longest = longest.min(self.wary.unwrap_or(f64::INFINITY));
+        match longest.is_infinite() && (0..self.n).any(|place| self.has_underflow(place)) {
+            true => f64::NAN,
+            false => longest,
+        }
+    }
+
+    /// May the last terms of a column be zero only because they are smaller than all numbers, as in huge units of time?
+    pub(super) fn has_underflow(&self, place: usize) -> bool {
+        let sizes = (1..self.order).map(|k| self.coefficient(place, k).abs());
+        sizes.filter(|&c| c > 0.0).any(|c| c < TAYLOR_UNDERFLOW)
     }
 
     /// Attempts a step of length `dt` with the coefficients taken last; the field is evaluated at its end.

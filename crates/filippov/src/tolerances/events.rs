@@ -152,7 +152,17 @@ pub const MOST_SLID_ON_AT_KINK: usize = 8;
 
 /// Where the sign of a user's function behind a zero is looked at, in shares of the piece that is searched: near, and farther
 /// from a double zero, where its values are within rounding for the square root of that.
-pub const SHARES_BEHIND_ZERO: [f64; 3] = [1e-7, 1e-5, 1e-3];
+pub const SHARES_BEHIND_ZERO: [f64; 5] = [1e-7, 1e-5, 1e-3, 1e-2, 1e-1];
+
+/// As [`BOUNDS_DEPTH`], for a user's function: beside a root inside of it two of its zeros may be this near to the root.
+pub const BOUNDS_DEPTH_BESIDE_ROOT: u32 = 32;
+
+/// A zero of a user's function this near to a kink or a jump, in shares of the piece before it, counts only if the sign changes
+/// clear of rounding on the way there: a root such as sqrt(|u|) is zero where u is within rounding of zero.
+pub const NEAR_KINK: f64 = 1e-6;
+
+/// Where that is looked at, in shares of the way from the zero to the kink.
+pub const SHARES_BEFORE_KINK: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Behind a touch the search goes on where a user's function is larger than its rounding by this factor: the touch is not
 /// found again.

@@ -5,6 +5,9 @@ use super::EPS;
 /// The first guess of a step is no shorter than this: it may still be shortened by many factors before the time ends it.
 pub const SMALLEST_GUESS: f64 = f64::MIN_POSITIVE / EPS;
 
+/// Nor is it shorter than so many roundings of the time.
+pub const GUESS_ROUNDINGS: f64 = 1e3;
+
 /// A motion of that many times the last step shows which step suits its mode.
 pub const MANY: f64 = 8.0;
 
@@ -57,6 +60,10 @@ pub const TAYLOR_LARGEST_ORDER: usize = 24;
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
 pub const TAYLOR_SHORTEST: f64 = 1e4;
+
+/// If the last Taylor coefficients are zero and one before them is below this, they may be those of a motion in huge units of
+/// time, too small for a number: coefficient k falls like the k-th power of the unit. Another method integrates it then.
+pub const TAYLOR_UNDERFLOW: f64 = 1e-100;
 
 /// Where functions may change though no Taylor coefficient tells, steps grow by at most this factor ...
 pub const WARY_GROWTH: f64 = 4.0;

@@ -11,7 +11,10 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
 use crate::mode::Signs;
-use crate::tolerances::{MOST_SAMPLES, MOST_ZEROS, PIECES_OF_SERIES, ROUNDING, SHARES_BEHIND_ZERO};
+use crate::tolerances::{
+    MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
+    SHARES_BEHIND_ZERO,
+};
 
 impl StepSearch<'_, '_> {
     /// The value of a user's function along the motion.
@@ -235,7 +238,7 @@ impl StepSearch<'_, '_> {
         // A root that begins here may not exist a rounding error before.
         let sign = match is_zero || value.is_nan() {
             true if to == from => 0.0,
-            true => sign_of(along.value(self, from + 1e-7 * (to - from))?),
+            true => self.first_sign_behind(along, from, to)?,
             false => sign_of(value),
         };
         let sign = if sign == 0.0 { before.before } else { sign };
@@ -250,6 +253,7 @@ impl StepSearch<'_, '_> {
             from,
             divided: is_zero,
             sign: side(sign),
+            clear: 0.0,
         })
     }
 
@@ -273,6 +277,7 @@ impl StepSearch<'_, '_> {
                     from,
                     divided: before.is_known_zero,
                     sign: side(before.before),
+                    clear: 0.0,
                 },
                 false => self.enter(&along, (from, to), before, &mut changes)?,
             };
@@ -326,7 +331,8 @@ impl StepSearch<'_, '_> {
                 return Ok(false);
             }
             if start.divided {
-                let sign = self.sign_behind(along, start.from, to)?;
+                let (sign, clear) = self.sign_behind(along, start.from, to)?;
+                start.clear = clear;
                 // A switching function that touches zero does not change its sign.
                 let is_here = |change: &Change| change.at == start.from && change.before == sign;
                 if along.is_inner() && changes.last().is_some_and(is_here) {
@@ -377,6 +383,14 @@ impl StepSearch<'_, '_> {
                 }
                 // What the sign is beyond the end of the piece tells whether it changes there.
                 Outcome::At(at) if kink && at >= to_end - together => break,
+                // The end is known up to rounding only: before it a function that turns back there may be zero too.
+                Outcome::At(at)
+                    if kink
+                        && to_end - at <= NEAR_KINK * (to_end - start.from)
+                        && !self.changes_before(along, at, to_end, start.sign)? =>
+                {
+                    break
+                }
                 Outcome::At(at) => {
                     // A zero at the end of the step is there to the bit: the next step knows it.
                     let is_at_end = at >= theta - together;
@@ -389,7 +403,7 @@ impl StepSearch<'_, '_> {
                     if changes.len() > MOST_ZEROS {
                         return Ok(false);
                     }
-                    let is_stuck = at <= start.from;
+                    let is_stuck = start.divided && at <= start.from;
                     (start.from, start.divided, start.sign) = (at, true, -start.sign);
                     if is_stuck || is_at_end {
                         break;
@@ -401,18 +415,51 @@ impl StepSearch<'_, '_> {
         Ok(true)
     }
 
-    /// The sign behind a zero, where it is clear of rounding: nearer to a multiple zero that decides.
-    fn sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<f64, FieldError> {
-        let mut nearest = 0.0;
-        for share in SHARES_BEHIND_ZERO {
-            let at = from + share * (to - from);
-            let value = along.value(self, at)?;
-            if value.abs() > along.rounding(self, at) {
+    /// Is the sign somewhere between a zero and the end of the piece, clear of rounding, another one than before?
+    fn changes_before(
+        &mut self,
+        along: &Along,
+        zero: f64,
+        end: f64,
+        before: f64,
+    ) -> Result<bool, FieldError> {
+        for share in SHARES_BEFORE_KINK {
+            let at = zero + share * (end - zero);
+            if before * along.value(self, at)? < -along.rounding(self, at) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The sign of a function that is zero where it is entered, or is not defined there, as near behind as it is clear of rounding.
+    fn first_sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<f64, FieldError> {
+        let last = 1e-7 * (to - from);
+        let mut behind = self.together(self.stepper.interpolant().dt);
+        while behind < last {
+            let value = along.value(self, from + behind)?;
+            if value.abs() > along.rounding(self, from + behind) {
                 return Ok(sign_of(value));
             }
-            nearest = if nearest == 0.0 { value } else { nearest };
+            behind *= 8.0;
         }
-        Ok(sign_of(nearest))
+        Ok(sign_of(along.value(self, from + last)?))
+    }
+
+    /// The sign behind a zero, where it is clear of rounding, and how far behind: nearer to a multiple zero, or to one of a steep
+    /// root, rounding decides.
+    fn sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<(f64, f64), FieldError> {
+        // The zero itself is known up to the rounding of time.
+        let least = self.together(self.stepper.interpolant().dt);
+        let mut behind = 0.0;
+        for share in SHARES_BEHIND_ZERO {
+            behind = (share * (to - from)).max(least.min(0.25 * (to - from)));
+            let value = along.value(self, from + behind)?;
+            if value.abs() > along.rounding(self, from + behind) {
+                return Ok((sign_of(value), behind));
+            }
+        }
+        Ok((0.0, behind))
     }
 
     /// The ends of the pieces that are searched one after the other, the first one last: a function without bounds is
@@ -436,6 +483,7 @@ impl StepSearch<'_, '_> {
                 true => before,
                 false => value.signum(),
             },
+            clear: 0.0,
         })
     }
 }

@@ -8,15 +8,15 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::series::{Series, NO_TERMS};
+use crate::event::series::{FirstZero, Series, NO_TERMS};
 use crate::event::tube::Tube;
 use crate::event::{SmoothParts, UserFunction};
 use crate::locate::refine;
 use crate::mode::Signs;
 use crate::motion::CurrentMotion;
-use crate::stepper::{powers_of_nested, Basis, Interpolant};
+use crate::stepper::{powers_of_nested, shift, Basis, Interpolant};
 use crate::system::Setting;
-use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH, EPS, POLE, ROUNDING};
+use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH_BESIDE_ROOT, EPS, POLE, ROUNDING};
 
 /// The value of a user's function along the motion.
 pub(super) fn value_along(
@@ -40,6 +40,8 @@ pub(super) struct Start {
     pub divided: bool,
     /// The sign of the function behind it.
     pub sign: f64,
+    /// If it is zero at `from`: it is clear of rounding so far behind it, in steps; 0 if that is not known.
+    pub clear: f64,
 }
 
 /// What came of the search of a piece.
@@ -173,21 +175,45 @@ impl<'f> Along<'f> {
         start.from == 0.0 && series.has_sign(start.sign, ROUNDING * size)
     }
 
-    /// The only zero in the step, from its start on, if the series has one that is far from rounding.
-    fn only_zero(&self, search: &StepSearch, from: f64, divided: bool, sign: f64) -> Option<f64> {
-        let rows = self.series.as_ref().filter(|_| from == 0.0 && !divided)?;
-        let signed: SmallVec<[f64; 32]> = rows.iter().map(|c| sign * c).collect();
-        let series = Series::new(&signed);
-        let size: f64 = rows.iter().map(|c| c.abs()).sum();
-        let noise = ROUNDING * size;
-        let [left, right] = series.ends();
-        if left <= noise || right >= -noise || !series.has_one_zero(noise) {
+    /// What the series tells of the piece, if that is far from rounding: the first zero, or that there is none. It is expanded
+    /// at the start of the piece, and divided by the distance if it is zero there.
+    fn told_by_series(&self, search: &StepSearch, start: Start, to: f64) -> Option<Outcome> {
+        let rows = self.series.as_ref()?;
+        let noise = ROUNDING * rows.iter().map(|c| c.abs()).sum::<f64>();
+        let Start {
+            from,
+            divided,
+            sign,
+            ..
+        } = start;
+        let length = to - from;
+        let mut on_piece = rows.clone();
+        shift(&mut on_piece, from);
+        let mut power = sign;
+        for c in &mut on_piece {
+            *c *= power;
+            power *= length;
+        }
+        let order = usize::from(divided);
+        if divided && (on_piece[0].abs() > noise || on_piece.len() == 1) {
             return None;
         }
+        let series = Series::new(&on_piece).divided(order);
+        let [left, right] = series.ends();
+        if left <= noise || right.abs() <= noise {
+            return None;
+        }
+        let FirstZero::Between { lo, hi, guess } = (match series.first_zero(1.0, noise, 0.0).0 {
+            FirstZero::Nowhere => return Some(Outcome::Nothing),
+            found => found,
+        }) else {
+            return None;
+        };
         let interpolant = search.stepper.interpolant();
-        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
-        let (at, _) = series.only_zero((0.0, 1.0), left / (left - right), width);
-        Some(at)
+        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0) / length;
+        let at = from + length * series.only_zero((lo, hi), guess, width).0;
+        // One at the end of the search needs a closer look.
+        (to - at > 4.0 * search.together(interpolant.dt)).then_some(Outcome::At(at))
     }
 
     /// How well the function is known at a point of the step; 0 for a smooth one, of which its values tell.
@@ -198,7 +224,13 @@ impl<'f> Along<'f> {
         let (interpolant, motion) = (search.stepper.interpolant(), &search.run.motion);
         let (margin, q) = (&search.detector.margin, &motion.discrete);
         let bound = self.bound(interpolant, margin, q, (theta, theta), 1.0);
-        bound.map_or(0.0, |bound| bound.value.hi - bound.value.lo)
+        // Where a root begins there are no bounds.
+        let width = bound.map_or(0.0, |bound| bound.value.hi - bound.value.lo);
+        if width.is_finite() {
+            width
+        } else {
+            0.0
+        }
     }
 
     /// Bounds on a piece, of the function times `sign`.
@@ -232,24 +264,21 @@ impl StepSearch<'_, '_> {
     pub(super) fn search_user_piece(
         &mut self,
         along: &Along,
-        Start {
-            from,
-            divided,
-            sign,
-        }: Start,
+        start: Start,
         to: f64,
         is_last: bool,
     ) -> Result<Outcome, FieldError> {
-        let expected = along.only_zero(self, from, divided, sign);
-        // One at the end of the search needs a closer look.
         let beside = self.together(self.stepper.interpolant().dt);
-        if let Some(at) = expected.filter(|at| (at - to).abs() > 4.0 * beside) {
-            return Ok(match at < to {
-                true => Outcome::At(at),
-                false => Outcome::Nothing,
-            });
+        if let Some(outcome) = along.told_by_series(self, start, to) {
+            return Ok(outcome);
         }
-        let limit = (to - from) * 1e-7;
+        let Start {
+            from,
+            divided,
+            sign,
+            clear,
+        } = start;
+        let limit = clear.max((to - from) * 1e-7);
         let rounding = along.rounding(self, from);
         let (interpolant, motion) = (self.stepper.interpolant(), &mut self.run.motion);
         let q = motion.discrete.clone();
@@ -278,7 +307,7 @@ impl StepSearch<'_, '_> {
         let evidence = Evidence::Bounds {
             bounds: &mut bounds,
             divided: i32::from(divided),
-            patience: BOUNDS_DEPTH,
+            patience: BOUNDS_DEPTH_BESIDE_ROOT,
         };
         // Rounding of a function whose terms are not known: that of its values.
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -309,7 +338,11 @@ impl StepSearch<'_, '_> {
                 width *= 2.0;
             }
             if at + width < to {
-                return Ok(Outcome::Touch(at + width));
+                // A sample may be on the zero to the bit.
+                return Ok(match g(at + width)? < 0.0 {
+                    true => Outcome::At(at),
+                    false => Outcome::Touch(at + width),
+                });
             }
         }
         // Zero up to rounding where the motion may end, as a switching function at its switch.
