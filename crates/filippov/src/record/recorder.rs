@@ -8,7 +8,9 @@ use crate::mode::Mode;
 use crate::motion::{CurrentMotion, Guard, Run};
 use crate::options::{Keep, Options, Stabilization};
 use crate::record::section::{Place, Section, Visits};
-use crate::record::{DecisionRecord, Observed, ObservedStep, Segment, Solution, Step};
+use crate::record::{
+    DecisionRecord, Observed, ObservedStep, Segment, Segments, Solution, Step, Switches,
+};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::{Interpolant, Steppers};
@@ -30,8 +32,8 @@ pub(crate) struct Recorder<'a> {
     keep_dense: bool,
     steps: Vec<Step>,
     coefficients: Vec<f64>,
-    segments: Vec<Segment>,
-    switches: Vec<Switch>,
+    segments: Segments,
+    switches: Switches,
     /// The last jump of the state.
     jump: Option<(f64, Vec<f64>)>,
     /// Wanted times that are sampled as the run goes on, the next one first.
@@ -62,8 +64,8 @@ impl<'a> Recorder<'a> {
             keep_dense,
             steps: Vec::new(),
             coefficients: Vec::new(),
-            segments: Vec::with_capacity(room),
-            switches: Vec::with_capacity(room),
+            segments: Segments::with_capacity(room),
+            switches: Switches::with_capacity(room),
             jump: None,
             is_sampled: wanted.is_some(),
             wanted: wanted.unwrap_or_default(),
@@ -161,17 +163,17 @@ impl<'a> Recorder<'a> {
         if before != after {
             self.user_events.forget_sides();
         }
-        if let Some(switch) = self.switches.get_mut(first) {
+        if let Some(switch) = self.switches.latest_mut().get_mut(first) {
             switch.y_before = SmallVec::from_slice(before);
         }
-        if let Some(switch) = self.switches[first..].last_mut() {
+        if let Some(switch) = self.switches.latest_mut()[first..].last_mut() {
             switch.y_after = SmallVec::from_slice(after);
         }
     }
 
     /// The mode after the switches of this instant, of which `first` is the first.
     pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
-        if let Some(last) = self.switches[first..].last_mut() {
+        if let Some(last) = self.switches.latest_mut()[first..].last_mut() {
             last.mode_after = after.clone();
         }
     }
@@ -189,8 +191,9 @@ impl<'a> Recorder<'a> {
         }
         let step = self.steps.len();
         self.close_segment(t);
+        self.segments.pack_earlier();
         if self.keep == Keep::Last {
-            self.segments.clear();
+            self.segments.forget_before(0);
         }
         self.segments.push(Segment {
             t_start: t,
@@ -204,7 +207,7 @@ impl<'a> Recorder<'a> {
 
     fn close_segment(&mut self, t: f64) {
         let n_steps = self.steps.len();
-        if let Some(segment) = self.segments.last_mut() {
+        if let Some(segment) = self.segments.latest_mut().last_mut() {
             segment.t_end = t;
             segment.steps.1 = n_steps;
         }
@@ -237,8 +240,10 @@ impl<'a> Recorder<'a> {
         if self.keeps_steps() {
             self.push(t_stop, y);
         }
-        if self.keep == Keep::Last && self.switches.len() > 2 * LATEST_SWITCHES {
-            self.switches.drain(..self.switches.len() - LATEST_SWITCHES);
+        if self.keep != Keep::Last {
+            self.switches.pack_earlier();
+        } else if self.switches.len() > 2 * LATEST_SWITCHES {
+            self.switches.forget_before(LATEST_SWITCHES);
         }
     }
 
@@ -265,7 +270,8 @@ impl<'a> Recorder<'a> {
     #[cold]
     #[inline(never)]
     fn show_step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
-        if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.last()) {
+        if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.latest().last())
+        {
             let motion = (&segment.mode, &segment.discrete[..]);
             observed.step(&ObservedStep::new(motion, (t_stop, y), interpolant));
         }
@@ -339,14 +345,14 @@ impl<'a> Recorder<'a> {
         self.switches.push(switch);
     }
 
-    /// The switches so far.
+    /// The latest switches: all of them, or many.
     pub fn switches(&self) -> &[Switch] {
-        &self.switches
+        self.switches.latest()
     }
 
     /// The surfaces of the switches recorded at this time.
     pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
-        let latest = self.switches.iter().rev().take_while(|s| s.t == t);
+        let latest = self.switches().iter().rev().take_while(|s| s.t == t);
         let mut surfaces: Vec<usize> = latest.flat_map(|s| s.surfaces.iter().copied()).collect();
         surfaces.sort_unstable();
         surfaces.dedup();
@@ -355,7 +361,7 @@ impl<'a> Recorder<'a> {
 
     /// Are the last switches so many touches at this very time that they look endless?
     pub fn only_touches_at(&self, t: f64) -> bool {
-        let latest = self.switches.iter().rev();
+        let latest = self.switches().iter().rev();
         let touches = latest.take_while(|s| s.t == t && s.kind == Kind::Grazing);
         touches.take(MOST_TOUCHES_AT_ONE_TIME).count() == MOST_TOUCHES_AT_ONE_TIME
     }
@@ -366,12 +372,11 @@ impl<'a> Recorder<'a> {
             let t_start = self.segments.first().map_or(t_last, |s| s.t_start);
             let y0 = self.y0.clone();
             self.push(t_start, &y0);
-            for switch in std::mem::take(&mut self.switches) {
-                if switch.t > t_start && switch.t < t_last {
-                    self.push(switch.t, &switch.y_after);
-                }
-                self.switches.push(switch);
+            let switches = std::mem::take(&mut self.switches);
+            for switch in switches.iter().filter(|s| s.t > t_start && s.t < t_last) {
+                self.push(switch.t, &switch.y_after);
             }
+            self.switches = switches;
         }
         if self.t.last() != Some(&t_last) {
             self.push(t_last, x);
@@ -397,12 +402,12 @@ impl<'a> Recorder<'a> {
             self.list_switches(t_last, x);
         }
         if self.keep == Keep::Last {
-            self.switches.clear();
+            self.switches = Switches::default();
         }
         if self.keep != Keep::Steps {
             // A result may be kept for long, beside many others.
-            self.switches.shrink_to_fit();
-            self.segments.shrink_to_fit();
+            self.switches.pack();
+            self.segments.pack();
             self.t.shrink_to_fit();
             self.y.shrink_to_fit();
         }
