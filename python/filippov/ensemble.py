@@ -141,8 +141,9 @@ class Ensemble(Sequence[Solution]):
     def n_warnings(self) -> npt.NDArray[np.int64]:
         """How many warnings each run has, shape (n_members,)."""
         found = self._runs.n_warnings
-        # An interrupted ensemble has fewer runs.
-        found += [len(prepared.warnings) for prepared, _ in zip(self._prepared, found, strict=False)]
+        if any(prepared.warnings for prepared in self._prepared):
+            # An interrupted ensemble has fewer runs.
+            found += [len(prepared.warnings) for prepared in self._prepared[: len(found)]]
         if self._wanted is not None:
             t0 = self._t_span[0]
             members = zip(self._run_of_each(), self._prepared, strict=False)
