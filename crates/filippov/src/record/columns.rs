@@ -8,7 +8,7 @@ use std::hash::Hash;
 
 use smallvec::SmallVec;
 
-use super::solution::Segment;
+use super::segment::Segment;
 use crate::mode::Mode;
 use crate::switch::{Kind, Switch};
 

@@ -8,6 +8,7 @@ mod kinks;
 mod observer;
 mod recorder;
 pub mod section;
+mod segment;
 mod solution;
 mod user_zeros;
 
@@ -21,5 +22,6 @@ pub use held::{as_multiplier, Held, Piece};
 pub use observer::{Gradient, InstantRecord, ObservedStep, Observer};
 pub(crate) use observer::{KeptInstant, Observed};
 pub(crate) use recorder::Recorder;
+pub use segment::Segment;
 pub(crate) use solution::Step;
-pub use solution::{Segment, Side, Solution};
+pub use solution::{Side, Solution};

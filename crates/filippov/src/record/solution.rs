@@ -1,37 +1,17 @@
 //! The record of a run: steps, segments, switches.
 
-use smallvec::SmallVec;
-
 use crate::error::FieldError;
 use crate::event::UserZero;
 use crate::mode::Mode;
 use crate::motion::Projector;
 use crate::options::SlidingRule;
 use crate::record::section::Returns;
-use crate::record::{DecisionRecord, Held, Piece, Segments, Switches};
+use crate::record::{DecisionRecord, Held, Piece, Segment, Segments, Switches};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
 use crate::switch::{Kind, Switch};
 use crate::system::{Actions, PiecewiseSystem, Setting};
-
-/// A piece of constant mode.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Segment {
-    /// Start.
-    pub t_start: f64,
-    /// End.
-    pub t_end: f64,
-    /// The mode.
-    pub mode: Mode,
-    /// Index of the first step, and one past the last.
-    pub steps: (usize, usize),
-    /// lambda of the surfaces slid on, in their order, at the start; NaN for those in contact.
-    pub multipliers: SmallVec<[f64; 2]>,
-    /// The discrete states.
-    pub discrete: Vec<f64>,
-}
 
 /// A step, or its part up to an event.
 #[derive(Clone, Copy, Debug)]
