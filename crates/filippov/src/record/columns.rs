@@ -27,7 +27,7 @@ pub trait Columns: Default {
     /// One row.
     type Row: Clone;
     /// How many rows there are.
-    fn len(&self) -> usize;
+    fn n_rows(&self) -> usize;
     /// Adds a row.
     fn push(&mut self, row: &Self::Row);
     /// A row, which is there.
@@ -60,7 +60,7 @@ impl<C: Columns> Rows<C> {
 
     /// How many rows there are.
     pub fn len(&self) -> usize {
-        self.packed.len() + self.latest.len()
+        self.packed.n_rows() + self.latest.len()
     }
 
     /// Are there none?
@@ -78,7 +78,7 @@ impl<C: Columns> Rows<C> {
     /// # Panics
     /// If there are not so many.
     pub fn at(&self, index: usize) -> C::Row {
-        let n = self.packed.len();
+        let n = self.packed.n_rows();
         match index.checked_sub(n) {
             Some(place) => self.latest[place].clone(),
             None => self.packed.at(index),
@@ -216,7 +216,7 @@ pub struct SwitchColumns {
 impl Columns for SwitchColumns {
     type Row = Switch;
 
-    fn len(&self) -> usize {
+    fn n_rows(&self) -> usize {
         self.t.len()
     }
 
@@ -296,7 +296,7 @@ impl SegmentColumns {
 impl Columns for SegmentColumns {
     type Row = Segment;
 
-    fn len(&self) -> usize {
+    fn n_rows(&self) -> usize {
         self.t_start.len()
     }
 
@@ -339,7 +339,7 @@ impl Columns for SegmentColumns {
 impl Segments {
     /// How many segments come first of which this holds, asked with the start of a segment and one past its last step.
     pub(crate) fn partition_point(&self, holds: impl Fn(f64, usize) -> bool) -> usize {
-        let n = self.packed.len();
+        let n = self.packed.n_rows();
         let (mut low, mut high) = (0, self.len());
         while low < high {
             let middle = low + (high - low) / 2;
