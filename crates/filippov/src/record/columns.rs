@@ -392,7 +392,7 @@ mod tests {
 
     #[test]
     fn rows_are_the_same_in_columns() {
-        let n = 3 * PLAIN;
+        let n = 3 * PLAIN - 1;
         let (mut switches, mut segments) = (Switches::default(), Segments::default());
         for k in 0..n {
             switches.push(switch(k));
