@@ -171,11 +171,11 @@ def plate() -> list[Line]:
         assert sol.success, sol.message
         return np.asarray(sol.y[:, -1])
 
-    exact = ours(1e-6)
+    exact = ours(1e-8)
     seconds, errors = {}, {}
     for name, way, tolerances in (
         ("ours", ours, (1e-3, 1e-4)),
-        ("scipy", lambda tol: by_sides(t_end, tol), (1e-3, 1e-4, 1e-5, 1e-6)),
+        ("scipy", lambda tol: by_sides(t_end, tol), (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)),
     ):
         for tolerance in tolerances:
             start = process_time()
@@ -183,18 +183,21 @@ def plate() -> list[Line]:
             seconds[name, tolerance] = process_time() - start
             error, time = errors[name, tolerance], seconds[name, tolerance]
             print(f"plate {name} {tolerance:g}: error {error:.1e}, {time:.2f} s")
-    target = errors["ours", 1e-4]
-    enough = [seconds[key] for key in seconds if key[0] == "scipy" and errors[key] <= target]
-    theirs = min(enough, default=np.inf)
-    return [
-        Line(
-            "plate of 100 x 100 with a thermostat: SciPy BDF (sparse) / Rodas5P, no larger error",
-            theirs / seconds["ours", 1e-4],
-            2.0,
-            at_least=True,
-            detail=f"{theirs:.2f} s / {seconds['ours', 1e-4]:.2f} s at {target:.0e}",
+    lines = []
+    for tolerance in (1e-3, 1e-4):
+        target, own = errors["ours", tolerance], seconds["ours", tolerance]
+        enough = [seconds[key] for key in seconds if key[0] == "scipy" and errors[key] <= target]
+        theirs = min(enough, default=np.inf)
+        lines.append(
+            Line(
+                f"heated plate, 100 x 100: SciPy BDF (sparse) / Rodas5P at {tolerance:g}, no larger error",
+                theirs / own,
+                2.0,
+                at_least=True,
+                detail=f"{theirs:.2f} s / {own:.2f} s at {target:.0e}",
+            )
         )
-    ]
+    return lines
 
 
 def contacts() -> list[Line]:

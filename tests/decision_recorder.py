@@ -9,7 +9,7 @@ from typing import Any
 import filippov.ensemble
 import filippov.options
 import filippov.solve
-from filippov._core import Run, RunOptions, TracedSystem
+from filippov._core import Run, RunOptions, Runs, TracedSystem
 
 __all__ = ["Decided", "is_traced", "recording"]
 
@@ -50,12 +50,13 @@ def recording(take: Decided) -> Iterator[None]:
         return run
 
     def run_many(
-        core: Any, t0: float, t1: float, y0: Any, p: Any, options: Any, events: Any, actions: Any, *rest: Any
-    ) -> Any:
-        runs, raised = solve_many(core, t0, t1, y0, p, options, events, actions, *rest)
-        for run, values in zip(runs, p, strict=False):
-            hand_on(run, core, values, options, actions)
-        return runs, raised
+        runs: Runs, core: Any, t0: float, t1: float, y0: Any, p: Any, options: Any, *rest: Any
+    ) -> BaseException | None:
+        first = len(runs)
+        raised = solve_many(runs, core, t0, t1, y0, p, options, *rest)
+        for index in range(first, len(runs)):
+            hand_on(runs[index], core, p[index - first], options, rest[1])
+        return raised
 
     filippov.options.RunOptions = options_that_keep  # type: ignore[assignment,misc]
     filippov.options._for_core.cache_clear()

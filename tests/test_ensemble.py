@@ -39,6 +39,20 @@ def test_members_are_runs_of_their_own(system: fl.System) -> None:
     assert (runs.t == 60).all()
 
 
+def test_a_member_of_which_the_end_is_kept_tells_as_much_as_a_run_of_its_own(system: fl.System) -> None:
+    y0, force = starts(20), np.linspace(0.1, 0.9, 20)
+    runs = system.ensemble((0, 60), y0, {"F": force})
+    for index in (0, 7, -1):
+        member, alone = runs[index], system.solve((0, 60), y0[index], {"F": force[index]}, keep="last")
+        assert member.stats == alone.stats
+        [own], [segment] = alone.segments, member.segments
+        assert (segment.t_start, segment.t_end, segment.mode) == (own.t_start, own.t_end, own.mode)
+        np.testing.assert_array_equal(segment.multipliers_end, own.multipliers_end)
+        assert len(member.switches) == 0
+    with pytest.raises(IndexError):
+        runs[20]
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3, 16])
 def test_the_number_of_threads_changes_nothing(system: fl.System, threads: int) -> None:
     one = fl.System(oscillator, n=2, params={"F": 0.4, "omega": 1 / 3}).ensemble(

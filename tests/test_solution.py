@@ -307,3 +307,23 @@ def test_a_subclass_of_the_solution_keeps_its_own() -> None:
     named = Named(**dict(short_run()))
     np.testing.assert_array_equal(named.final, short_run().y[:, -1])
     assert np.array_equal(pickle.loads(pickle.dumps(short_run())).y[:, -1], named.final)
+
+
+def test_a_long_run_keeps_its_switches_and_segments_as_short_runs_do() -> None:
+    def relay(t: float, x: Any) -> Any:
+        return [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1])]
+
+    system = fl.System(relay, n=2)
+    options = {"rtol": 1e-6, "atol": 1e-6, "max_events": 10**5}
+    long = system.solve((0, 12_000), [1.0, 2.0], keep="switches", **options)
+    short = system.solve((0, 600), [1.0, 2.0], keep="switches", **options)
+    n = len(short.switches) - 1
+    assert len(long.switches) > 2048 > n > 100
+    assert len(long.segments) == len(long.switches) + 1
+    np.testing.assert_array_equal(long.segments.t_start[1:], long.switches.t)
+    np.testing.assert_array_equal(long.segments.t_end[:-1], long.switches.t)
+    assert [segment.t_end for segment in long.segments[:5]] == long.segments.t_end[:5].tolist()
+    for name in ("t", "y_before", "y_after", "kind"):
+        np.testing.assert_array_equal(getattr(long.switches, name)[:n], getattr(short.switches, name)[:n])
+    assert long.switches.mode_after[:n] == short.switches.mode_after[:n]
+    assert long.segments.mode[:n] == short.segments.mode[:n]

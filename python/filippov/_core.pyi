@@ -17,6 +17,7 @@ __all__ = [
     "Regions",
     "Run",
     "RunOptions",
+    "Runs",
     "SignedSystem",
     "TracedEvent",
     "TracedSystem",
@@ -199,6 +200,19 @@ class SignedSystem:
     def is_native(self) -> bool: ...
 
 @final
+class Runs:
+    def __init__(self) -> None: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: int) -> Run: ...
+    @property
+    def t_last(self) -> _Array: ...
+    @property
+    def y_last(self) -> _Array: ...
+    @property
+    def status(self) -> npt.NDArray[np.int64]: ...
+    @property
+    def n_warnings(self) -> npt.NDArray[np.int64]: ...
+
 class Run:
     @property
     def t(self) -> _Array: ...
@@ -218,6 +232,10 @@ class Run:
     ) -> list[
         tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str, str, bool]
     ]: ...
+    @property
+    def n_segments(self) -> int: ...
+    @property
+    def segment_times(self) -> tuple[_Array, _Array]: ...
     @property
     def segments(self) -> list[tuple[float, float, tuple[int, ...], int, int, _Array, _Array]]: ...
     @property
@@ -327,6 +345,7 @@ def solve(
     wrt: tuple[list[tuple[int, int]], list[int], int] | None = None,
 ) -> Run: ...
 def solve_many(
+    runs: Runs,
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t0: float,
     t1: float,
@@ -337,7 +356,7 @@ def solve_many(
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
     wrt: tuple[list[tuple[int, int]], list[int], int] | None = None,
-) -> tuple[list[Run], BaseException | None]: ...
+) -> BaseException | None: ...
 def growth_many(
     system: TracedSystem,
     spans: _Array,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, solve_many
+from filippov._core import Run, Runs, solve_many
 from filippov.arrays import finite_array, real_array
 from filippov.core_events import CoreEvent, core_events
 from filippov.derivatives import FORWARD_ONLY, Wanted, check_wrt, refuse_without_derivatives
@@ -61,7 +61,7 @@ class Ensemble(Sequence[Solution]):
 
     def __init__(
         self,
-        runs: Sequence[Run],
+        runs: Runs,
         system: System,
         prepared: Sequence[Prepared],
         parameters: Sequence[str],
@@ -113,20 +113,23 @@ class Ensemble(Sequence[Solution]):
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
 
+    def _run_of_each(self) -> Iterator[Run]:
+        return (self._runs[i] for i in range(len(self)))
+
     @cached_property
     def t(self) -> Array:
         """The last time that each run reached, shape (n_members,)."""
-        return np.array([run.t_last for run in self._runs])
+        return self._runs.t_last
 
     @cached_property
     def y(self) -> Array:
         """The last state of each run, shape (n_members, n)."""
-        return np.array([run.y_last for run in self._runs])
+        return self._runs.y_last
 
     @cached_property
     def status(self) -> npt.NDArray[np.int64]:
         """0 at the end, 1 at a terminal event, -1 where a run failed, shape (n_members,)."""
-        return np.array([run.status for run in self._runs])
+        return self._runs.status
 
     @cached_property
     def success(self) -> npt.NDArray[np.bool_]:
@@ -137,20 +140,21 @@ class Ensemble(Sequence[Solution]):
     @cached_property
     def n_warnings(self) -> npt.NDArray[np.int64]:
         """How many warnings each run has, shape (n_members,)."""
-
-        def count(run: Run, prepared: Prepared) -> int:
-            of_derivatives = derivative_warnings(run, self._t_span[0], prepared.surfaces)
-            return run.n_warnings + len(prepared.warnings) + len(of_derivatives)
-
-        # An interrupted ensemble has fewer runs.
-        pairs = zip(self._runs, self._prepared, strict=False)
-        return np.array([count(run, prepared) for run, prepared in pairs], dtype=np.int64)
+        found = self._runs.n_warnings
+        if any(prepared.warnings for prepared in self._prepared):
+            # An interrupted ensemble has fewer runs.
+            found += [len(prepared.warnings) for prepared in self._prepared[: len(found)]]
+        if self._wanted is not None:
+            t0 = self._t_span[0]
+            members = zip(self._run_of_each(), self._prepared, strict=False)
+            found += [len(derivative_warnings(run, t0, prepared.surfaces)) for run, prepared in members]
+        return found
 
     @cached_property
     def outputs(self) -> dict[str, Array]:
         """The outputs at the ends of the runs, by name, each of shape (n_members,)."""
         rows = [dict(zip(self._parameters, row, strict=True)) for row in self._values.tolist()]
-        members = list(zip(self._prepared, self._runs, rows, strict=False))
+        members = list(zip(self._prepared, self._run_of_each(), rows, strict=False))
         given = self._system.outputs
         return {
             name: at_ends(self._system, fun, f"the output {name!r}", members) for name, fun in given.items()
@@ -210,7 +214,7 @@ class Ensemble(Sequence[Solution]):
         if len(outside):
             raise ValueError(f"t: {outside[0]:.17g} is outside of [{t0:.17g}, {t1:.17g}]")
         found = np.full((*shape, len(flat)), np.nan)
-        for values, run, member in zip(found, self._runs, self, strict=True):
+        for values, run, member in zip(found, self._run_of_each(), self, strict=True):
             is_reached = flat <= run.t_last
             if is_reached.any():
                 values[..., is_reached] = member.derivative(flat[is_reached], side)
@@ -254,11 +258,13 @@ def run_ensemble(
         fit_kappa(checked.sliding, group.prepared.surfaces)
         if wanted is not None:
             refuse_without_derivatives(group.prepared, (t0, t1))
-    runs: list[Run] = []
+    runs = Runs()
     raised: BaseException | None = None
     for group, members in _in_parts(groups, len(states), n_threads, progress.is_wanted):
         report = report_of_members(progress, len(runs)) if progress.is_wanted else None
-        done, raised = solve_many(
+        first = len(runs)
+        raised = solve_many(
+            runs,
             group.prepared.core,
             t0,
             t1,
@@ -270,10 +276,9 @@ def run_ensemble(
             n_threads,
             None if wanted is None else wanted.for_core(),
         )
-        runs += done
         if raised is not None:
             break
-        progress.add(len(done), sum(run.status < 0 for run in done))
+        progress.add(len(runs) - first, int(np.count_nonzero(runs.status[first:] < 0)))
     progress.close()
     ensemble = Ensemble(
         runs,

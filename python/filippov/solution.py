@@ -23,6 +23,7 @@ from filippov.start import StandingRun
 from filippov.switches import (
     NO_DERIVATIVES,
     RunWarning,
+    SegmentRows,
     SegmentTable,
     SwitchRows,
     SwitchTable,
@@ -504,7 +505,8 @@ class Solution:
     @cached_property
     def segments(self) -> SegmentTable:
         """Pieces of constant mode."""
-        return SegmentTable(self._run.segments)
+        run = self._run
+        return SegmentTable(SegmentRows(run) if isinstance(run, Run) else run.segments)
 
     @cached_property
     def discrete(self) -> dict[str, Array]:

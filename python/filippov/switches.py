@@ -243,17 +243,14 @@ class RunWarning(NamedTuple):
         return f"t = {self.t:.10g}: {self.message} [{self.code}{rule}]"
 
 
-class SwitchRows(Sequence[tuple[Any, ...]]):
-    """The switches of a run in the core: how many there are, and when, is known without a table of them."""
+class _RowsOfRun(Sequence[tuple[Any, ...]]):
+    """Rows of a table in the core: the table is made when a row is asked for."""
 
     __slots__ = ("_rows", "_run")
 
     def __init__(self, run: Run) -> None:
         self._run = run
         self._rows: list[tuple[Any, ...]] | None = None
-
-    def __len__(self) -> int:
-        return self._run.n_switches
 
     @overload
     def __getitem__(self, index: int) -> tuple[Any, ...]: ...
@@ -269,15 +266,47 @@ class SwitchRows(Sequence[tuple[Any, ...]]):
         return list, (self._all,)
 
     @property
+    def _all(self) -> list[tuple[Any, ...]]:
+        if self._rows is None:
+            self._rows = self._made()
+        return self._rows
+
+    def _made(self) -> list[tuple[Any, ...]]:
+        raise NotImplementedError
+
+
+class SwitchRows(_RowsOfRun):
+    """The switches of a run in the core: how many there are, and when, is known without a table of them."""
+
+    __slots__ = ()
+
+    def __len__(self) -> int:
+        return self._run.n_switches
+
+    @property
     def t(self) -> Array:
         """Times, shape (k,)."""
         return self._run.switch_times
 
+    def _made(self) -> list[tuple[Any, ...]]:
+        return self._run.switches
+
+
+class SegmentRows(_RowsOfRun):
+    """The segments of a run in the core: how many there are, and when, is known without a table of them."""
+
+    __slots__ = ()
+
+    def __len__(self) -> int:
+        return self._run.n_segments
+
     @property
-    def _all(self) -> list[tuple[Any, ...]]:
-        if self._rows is None:
-            self._rows = self._run.switches
-        return self._rows
+    def times(self) -> tuple[Array, Array]:
+        """Times at which the segments begin, and at which they end, each of shape (k,)."""
+        return self._run.segment_times
+
+    def _made(self) -> list[tuple[Any, ...]]:
+        return self._run.segments
 
 
 class SwitchTable(Sequence[Switch]):
@@ -511,11 +540,15 @@ class SegmentTable(Sequence[Segment]):
     @property
     def t_start(self) -> Array:
         """Times at which the segments begin, shape (k,)."""
+        if isinstance(self._rows, SegmentRows):
+            return self._rows.times[0]
         return np.array([row[0] for row in self._rows], dtype=np.float64)
 
     @property
     def t_end(self) -> Array:
         """Times at which the segments end, shape (k,)."""
+        if isinstance(self._rows, SegmentRows):
+            return self._rows.times[1]
         return np.array([row[1] for row in self._rows], dtype=np.float64)
 
     @property

@@ -16,6 +16,7 @@ mod page;
 mod prepared_run;
 mod regions;
 mod run;
+mod runs;
 mod saved;
 mod solve;
 mod sweep;
@@ -51,6 +52,8 @@ mod _core {
     use super::regions::Regions;
     #[pymodule_export]
     use super::run::Run;
+    #[pymodule_export]
+    use super::runs::Runs;
     #[pymodule_export]
     use super::saved::{load_system, save_system};
     #[pymodule_export]

@@ -213,6 +213,17 @@ impl PreparedRun {
         self.is_native
     }
 
+    /// Was its field native code when it ran?
+    pub fn set_native(&mut self, is_native: bool) {
+        self.is_native = is_native;
+    }
+
+    /// Is it made of its system, its initial state and its parameters alone?
+    pub fn is_plain(&self) -> bool {
+        let has_no_actions = self.given.is_empty() && self.laws.is_empty();
+        self.compiled.is_some() && has_no_actions && self.discrete.is_empty()
+    }
+
     /// How many of its surfaces a user sees.
     pub fn n_visible(&self) -> usize {
         self.n_visible

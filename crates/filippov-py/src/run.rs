@@ -3,7 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, message_of, not_finite, Held, Method, Mode, Segment, Side, Solution, Stats, Stop,
+    as_multiplier, message_of, not_finite, EndOnly, Held, Method, Mode, Segment, Side, Solution,
+    Stats, Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -91,6 +92,35 @@ impl Run {
     /// Did the caller stop it?
     pub fn was_interrupted(&self) -> bool {
         matches!(self.solution().stop, Stop::Interrupted)
+    }
+
+    /// Its end, and whether its field was native code, if that with its system is all that is left of it.
+    pub fn end_only(&self) -> Option<(EndOnly, bool)> {
+        if self.error.is_some() || self.derivatives.is_some() || !self.prepared.is_plain() {
+            return None;
+        }
+        let end = EndOnly::of(&self.solution())?;
+        Some((end, self.prepared.is_native()))
+    }
+
+    /// The last time reached.
+    pub fn last_time(&self) -> f64 {
+        self.solution().t_last
+    }
+
+    /// The state there.
+    pub fn last_state(&self) -> Vec<f64> {
+        self.solution().last_state().to_vec()
+    }
+
+    /// How it ended.
+    pub fn status_code(&self) -> i32 {
+        self.solution().stop.status()
+    }
+
+    /// How many warnings it has.
+    pub fn count_warnings(&self) -> usize {
+        self.solution().warnings.len()
     }
 
     /// A mode as a user sees it.
@@ -231,10 +261,26 @@ impl Run {
                     self.mode(py, &s.mode_after)?,
                     s.note.clone(),
                     s.rule,
-                    solution.is_kink(&**self.system(), s).map_err(raised)?,
+                    solution.is_kink(&**self.system(), &s).map_err(raised)?,
                 ))
             })
             .collect()
+    }
+
+    /// How many segments there are.
+    #[getter]
+    fn n_segments(&self) -> usize {
+        self.solution().segments.len()
+    }
+
+    /// The times at which they begin, and those at which they end.
+    #[getter]
+    fn segment_times<'py>(&self, py: Python<'py>) -> (Vector<'py>, Vector<'py>) {
+        let solution = self.solution();
+        let segments = || solution.segments.iter();
+        let starts = segments().map(|s| s.t_start).collect();
+        let ends = segments().map(|s| s.t_end).collect();
+        (PyArray1::from_vec(py, starts), PyArray1::from_vec(py, ends))
     }
 
     #[getter]
@@ -244,7 +290,7 @@ impl Run {
             .segments
             .iter()
             .map(|s| {
-                let (start, end) = self.multipliers_at_ends(&solution, s)?;
+                let (start, end) = self.multipliers_at_ends(&solution, &s)?;
                 Ok((
                     s.t_start,
                     s.t_end,
@@ -630,7 +676,8 @@ impl Run {
         let mut out = Vec::new();
         for &t in t.as_slice()? {
             let segment = solution.segment_at(t, side_of(left));
-            let states = segment.map_or(&solution.discrete, |segment| &segment.discrete);
+            let of_segment = segment.map(|segment| segment.discrete);
+            let states = of_segment.as_ref().unwrap_or(&solution.discrete);
             let named = states.get(..n);
             out.extend(named.ok_or_else(|| PyValueError::new_err("n: too many"))?);
         }

@@ -15,6 +15,7 @@ use crate::clock::ManualClock;
 use crate::derivatives::{Failure, RunDerivatives, Wanted};
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::{is_interruption, Run};
+use crate::runs::Runs;
 use crate::systems::TracedSystem;
 use crate::threads::{on_threads, Report, CHUNK_PER_THREAD, POLL_EVERY};
 
@@ -91,13 +92,14 @@ fn extension_of(
 }
 
 /// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some
-/// threads. The result of each is that of a run of its own. Where a signal raised, the runs are the first ones, and
-/// the exception stands beside them.
+/// threads, and adds them to `runs`. The result of each is that of a run of its own. Where a signal raised, the runs are the first
+/// ones, and the exception is returned.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions, threads, wrt=None))]
+#[pyo3(signature = (runs, system, t0, t1, y0, p, options, events, actions, threads, wrt=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve_many(
     py: Python<'_>,
+    runs: &Runs,
     system: Bound<'_, PyAny>,
     t0: f64,
     t1: f64,
@@ -108,11 +110,12 @@ pub fn solve_many(
     actions: Vec<ActionRow>,
     threads: usize,
     wrt: Option<Wanted>,
-) -> PyResult<(Vec<Run>, Option<Py<PyAny>>)> {
+) -> PyResult<Option<Py<PyAny>>> {
     let (y0, p) = (y0.as_array(), p.as_array());
     let extension = extension_of(&system, wrt.as_ref())?;
     let wanted = extension.as_ref().zip(wrt.as_ref());
-    let mut runs = Vec::with_capacity(y0.nrows());
+    let first = runs.len();
+    runs.begin(&system, t0, y0.nrows());
     let rows: Vec<usize> = (0..y0.nrows()).collect();
     for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
         let prepare = |&row: &usize| {
@@ -127,24 +130,25 @@ pub fn solve_many(
             |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
         let report = Report {
             function: options.progress.as_ref(),
-            before: runs.len(),
+            before: runs.len() - first,
         };
         let done = py.detach(|| on_threads(&prepared, threads, &report, run, is_last));
         let is_cut = done.results.len() < prepared.len();
-        for (prepared, outcome) in prepared.into_iter().zip(done.results) {
+        for ((prepared, outcome), &row) in prepared.into_iter().zip(done.results).zip(chunk) {
             let (solution, derivatives) = outcome.map_err(PyErr::from)?;
-            runs.push(prepared.result(solution, derivatives));
+            let run = prepared.result(solution, derivatives);
+            runs.push(py, run, p.row(row).to_vec())?;
         }
         let raised = done.raised.or_else(|| py.check_signals().err());
         let raised = raised.or_else(|| {
-            let interrupted = runs.iter().any(Run::was_interrupted);
+            let interrupted = runs.was_interrupted(first);
             (is_cut || interrupted).then(|| PyKeyboardInterrupt::new_err(()))
         });
         if let Some(raised) = raised {
-            return Ok((runs, Some(raised.into_value(py).into_any())));
+            return Ok(Some(raised.into_value(py).into_any()));
         }
     }
-    Ok((runs, None))
+    Ok(None)
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

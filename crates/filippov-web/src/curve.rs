@@ -43,14 +43,14 @@ pub fn curve(
     };
     let mut curve = Curve::default();
     for (index, segment) in solution.segments.iter().enumerate() {
-        let points = sampler.points_of(segment, index)?;
+        let points = sampler.points_of(&segment, index)?;
         let first = curve.t.len();
         for place in sampler.thinned(&points) {
             curve.t.push(points.t[place]);
             curve.y.extend_from_slice(sampler.state(&points, place));
         }
         curve.pieces.push(CurvePiece {
-            mode: segment.mode.clone(),
+            mode: segment.mode,
             first,
             last: curve.t.len() - 1,
         });
@@ -61,14 +61,15 @@ pub fn curve(
 /// The extent of each state over the ends of the steps and the switches.
 fn extents(solution: &Solution) -> impl Iterator<Item = f64> + '_ {
     (0..solution.n_states).map(move |i| {
-        let ends = solution.y.iter().skip(i).step_by(solution.n_states);
+        let ends = solution.y.iter().copied().skip(i);
+        let ends = ends.step_by(solution.n_states);
         let switches = solution.switches.iter();
-        let switches = switches.flat_map(move |s| [&s.y_before[i], &s.y_after[i]]);
-        let last = solution.last_state().get(i);
+        let switches = switches.flat_map(move |s| [s.y_before[i], s.y_after[i]]);
+        let last = solution.last_state().get(i).copied();
         let all = ends.chain(switches).chain(last).filter(|y| y.is_finite());
         let (low, high, size) = all.fold(
             (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64),
-            |(low, high, size), &y| (low.min(y), high.max(y), size.max(y.abs())),
+            |(low, high, size), y| (low.min(y), high.max(y), size.max(y.abs())),
         );
         (high - low).max(LEAST_EXTENT * size.max(f64::MIN_POSITIVE))
     })

@@ -21,7 +21,7 @@ fn main() -> Result<(), filippov::Error> {
     let solution = Problem::new(&oscillator, (0.0, 60.0), &[1.0, 2.0])
         .options(&options)
         .solve()?;
-    for switch in &solution.switches {
+    for switch in solution.switches.iter() {
         let (kind, mode) = (switch.kind.name(), &switch.mode_after);
         println!("{:.6}  {kind}  ({mode})", switch.t);
     }

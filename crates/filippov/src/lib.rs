@@ -49,7 +49,7 @@
 //! let solution = Problem::new(&relay, (0.0, 2.0), &[0.0]).solve()?;
 //!
 //! // It rises with 1.3, reaches the surface at t = 0.5 / 1.3, and slides.
-//! assert!((solution.switches[0].t - 0.5 / 1.3).abs() < 1e-15);
+//! assert!((solution.switches.at(0).t - 0.5 / 1.3).abs() < 1e-15);
 //! assert_eq!(solution.mode.entries(), [0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -115,9 +115,10 @@ pub use integrate::{Integrator, Problem, Reached};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{
-    as_multiplier, replay_decision, section, DecisionCause, DecisionOutcome, DecisionPoint,
-    DecisionRecord, Gradient, Held, InstantRecord, ObservedStep, Observer, Piece, Segment, Side,
-    Solution, StartingZero,
+    as_multiplier, replay_decision, section, Columns, DecisionCause, DecisionOutcome,
+    DecisionPoint, DecisionRecord, EndOnly, Gradient, Held, InstantRecord, ObservedStep, Observer,
+    Piece, Rows, Segment, SegmentColumns, Segments, Side, Solution, StartingZero, SwitchColumns,
+    Switches,
 };
 pub use saved::{ReadySystem, RunnableSystem, SavedAction, SavedSystem};
 pub use stats::Stats;

@@ -108,15 +108,16 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
-        let sign = |entry: i8| if entry < 0 { -1.0 } else { 1.0 };
-        match &self.0 {
-            // As many at a time, which takes fewer instructions than to count them.
-            Entries::Short { length, entries } if usize::from(*length) <= FEW => {
-                let few = std::array::from_fn(|j| sign(entries[j]));
-                Signs::from_buf_and_len(few, usize::from(*length))
+        let mut signs = match self.entries().len() {
+            few @ ..=FEW => Signs::from_buf_and_len([1.0; FEW], few),
+            many => Signs::from_elem(1.0, many),
+        };
+        for (sign, &entry) in signs.iter_mut().zip(self.entries()) {
+            if entry < 0 {
+                *sign = -1.0;
             }
-            _ => self.entries().iter().map(|&entry| sign(entry)).collect(),
         }
+        signs
     }
 
     /// Sets entry `j`.

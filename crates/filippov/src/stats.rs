@@ -44,6 +44,41 @@ impl Stats {
         self.n_rejected_sliding += u64::from(is_sliding);
     }
 
+    /// All counters, in a fixed order. The two times are none.
+    pub(crate) fn counts_mut(&mut self) -> Vec<&mut u64> {
+        let Stats {
+            n_field_evaluations,
+            n_surface_evaluations,
+            n_steps,
+            n_steps_by,
+            stiff_since: _,
+            n_jacobians,
+            n_factorisations,
+            n_rejected,
+            n_steps_sliding,
+            n_rejected_sliding,
+            n_extensions,
+            n_switches,
+            n_switches_here,
+            here_since: _,
+        } = self;
+        let mut all = vec![
+            n_field_evaluations,
+            n_surface_evaluations,
+            n_steps,
+            n_jacobians,
+            n_factorisations,
+            n_rejected,
+            n_steps_sliding,
+            n_rejected_sliding,
+            n_extensions,
+            n_switches,
+            n_switches_here,
+        ];
+        all.extend(n_steps_by);
+        all
+    }
+
     /// Accepted steps that this method took.
     pub fn n_steps_of(&self, method: Method) -> u64 {
         self.n_steps_by[method as usize]

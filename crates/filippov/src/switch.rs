@@ -29,7 +29,7 @@ pub struct Switch {
 }
 
 /// The word for what happened, as the field uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Kind {
     /// From one region to the next, or across a further surface while sliding.

@@ -120,5 +120,5 @@ fn a_repelling_mode_is_not_taken() {
     assert!(run.stop.is_success(), "{:?}", run.stop);
     let end = run.y.last().unwrap();
     assert!((end - -1.0).abs() < 1e-12);
-    assert_eq!(run.segments[0].mode.entries(), [1, -1]);
+    assert_eq!(run.segments.at(0).mode.entries(), [1, -1]);
 }

@@ -80,7 +80,7 @@ fn instants_are_the_switches_with_the_fields_of_both_sides() {
     assert_eq!(kept.instants.len(), solution.switches.len());
     assert!(kept.instants.len() > 8);
     let mut kinds = Vec::new();
-    for (instant, switch) in kept.instants.iter().zip(&solution.switches) {
+    for (instant, switch) in kept.instants.iter().zip(solution.switches.iter()) {
         assert_eq!(instant.t, [switch.t; 2]);
         assert_eq!(
             instant.mode,

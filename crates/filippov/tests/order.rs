@@ -107,8 +107,8 @@ fn event_times_on_a_fixed_surface() {
     ];
     assert_eq!(kinds(&reference), expected);
     for (index, what) in [(1, "entry"), (2, "exit"), (3, "second entry")] {
-        let t = reference.switches[index].t;
-        assert_order_5(order(&system, |s| s.switches[index].t - t), what);
+        let t = reference.switches.at(index).t;
+        assert_order_5(order(&system, |s| s.switches.at(index).t - t), what);
     }
 }
 
@@ -121,8 +121,8 @@ fn event_times_on_a_moving_surface() {
         [Kind::EnterSliding, Kind::ExitSliding, Kind::EnterSliding]
     );
     for (index, what) in [(0, "entry"), (1, "exit")] {
-        let t = reference.switches[index].t;
-        assert_order_5(order(&system, |s| s.switches[index].t - t), what);
+        let t = reference.switches.at(index).t;
+        assert_order_5(order(&system, |s| s.switches.at(index).t - t), what);
     }
 }
 

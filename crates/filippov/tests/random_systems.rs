@@ -164,13 +164,14 @@ fn segments_tile_the_interval_and_the_state_is_continuous() {
         if solution.segments.is_empty() {
             return Ok(());
         }
-        prop_assert_eq!(solution.segments[0].t_start, 0.0);
+        prop_assert_eq!(solution.segments.at(0).t_start, 0.0);
         prop_assert_eq!(solution.segments.last().unwrap().t_end, solution.t_last);
-        for pair in solution.segments.windows(2) {
+        let segments: Vec<_> = solution.segments.iter().collect();
+        for pair in segments.windows(2) {
             prop_assert_eq!(pair[0].t_end, pair[1].t_start);
             prop_assert!(pair[0].t_end >= pair[0].t_start);
         }
-        for switch in &solution.switches {
+        for switch in solution.switches.iter() {
             prop_assert_eq!(&switch.y_before, &switch.y_after);
             let (left, _) = at(&system, &solution, switch.t, Side::Left);
             let (right, _) = at(&system, &solution, switch.t, Side::Right);
@@ -273,7 +274,7 @@ fn the_order_of_the_surfaces_and_their_factors_change_nothing() {
         let other = run(&other_system, random);
         prop_assert!(matches!(other.stop, Stop::End), "{:?}", other.stop);
         prop_assert_eq!(plain.switches.len(), other.switches.len());
-        for (a, b) in plain.switches.iter().zip(&other.switches) {
+        for (a, b) in plain.switches.iter().zip(other.switches.iter()) {
             prop_assert_eq!(a.kind, b.kind);
             for (j, &entry) in a.mode_after.entries().iter().enumerate() {
                 let place = m - 1 - j;

@@ -37,7 +37,7 @@ pub fn run(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         json!({"mode": mode.to_string(), "first": piece.first, "last": piece.last, "kind": kind})
     });
     let switches = solution.switches_of_first(n_visible);
-    let switches = switches.map(|switch| switch_of(model, system, &solution, switch));
+    let switches = switches.map(|switch| switch_of(model, system, &solution, &switch));
     let mut reply = Reply::new("run");
     set_outcome(&mut reply, model, system, &solution);
     reply.set("pieces", pieces.collect::<Vec<Value>>());

@@ -18,6 +18,9 @@ const MOST_MINORS: usize = 10;
 /// definite, A D + D A^T > 0, with D tried so that A D is symmetric if it can be: friction with
 /// different coefficients.
 pub fn is_p_matrix(matrix: &SparseRows) -> Option<bool> {
+    if matrix.is_diagonal() {
+        return Some(!(0..matrix.n_rows()).any(|i| matrix.diagonal(i) <= 0.0));
+    }
     let mut answer = Some(true);
     for (_, block) in coupled_blocks(matrix) {
         match decide_block(&block) {

@@ -20,7 +20,7 @@ impl Solution {
         if !matches!(s.kind, Kind::Crossing | Kind::Grazing) || s.y_before != s.y_after {
             return Ok(false);
         }
-        let discrete = |side| Some(&self.segment_at(s.t, side)?.discrete);
+        let discrete = |side| Some(self.segment_at(s.t, side)?.discrete);
         let (Some(q), Some(q_after)) = (discrete(Side::Left), discrete(Side::Right)) else {
             return Ok(false);
         };
@@ -49,7 +49,7 @@ impl Solution {
             return Ok(false);
         }
         for pattern in 0..1_usize << slid_on.len() {
-            let sides = [(&s.mode_before, q), (&beyond, q_after)];
+            let sides = [(&s.mode_before, &q), (&beyond, &q_after)];
             let modes = sides.map(|(mode, q)| (mode.on_sides(&slid_on, pattern), q));
             if jumps(system, (s.t, &s.y_before), &modes)? {
                 return Ok(false);

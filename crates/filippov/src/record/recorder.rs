@@ -8,7 +8,9 @@ use crate::mode::Mode;
 use crate::motion::{CurrentMotion, Guard, Run};
 use crate::options::{Keep, Options, Stabilization};
 use crate::record::section::{Place, Section, Visits};
-use crate::record::{DecisionRecord, Observed, ObservedStep, Segment, Solution, Step};
+use crate::record::{
+    DecisionRecord, Observed, ObservedStep, Segment, Segments, Solution, Step, Switches,
+};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::{Interpolant, Steppers};
@@ -35,8 +37,8 @@ pub(crate) struct Recorder<'a> {
     keep_dense: bool,
     steps: Vec<Step>,
     coefficients: Vec<f64>,
-    segments: Vec<Segment>,
-    switches: Vec<Switch>,
+    segments: Segments,
+    switches: Switches,
     /// How often the last of them, a touch, was repeated without any progress of time.
     n_repeated: usize,
     /// The last jump of the state.
@@ -69,8 +71,8 @@ impl<'a> Recorder<'a> {
             keep_dense,
             steps: Vec::new(),
             coefficients: Vec::new(),
-            segments: Vec::with_capacity(room),
-            switches: Vec::with_capacity(room),
+            segments: Segments::with_capacity(room),
+            switches: Switches::with_capacity(room),
             n_repeated: 0,
             jump: None,
             is_sampled: wanted.is_some(),
@@ -169,17 +171,17 @@ impl<'a> Recorder<'a> {
         if before != after {
             self.user_events.forget_sides();
         }
-        if let Some(switch) = self.switches.get_mut(first) {
+        if let Some(switch) = self.switches.latest_mut().get_mut(first) {
             switch.y_before = SmallVec::from_slice(before);
         }
-        if let Some(switch) = self.switches[first..].last_mut() {
+        if let Some(switch) = self.switches.latest_mut()[first..].last_mut() {
             switch.y_after = SmallVec::from_slice(after);
         }
     }
 
     /// The mode after the switches of this instant, of which `first` is the first.
     pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
-        if let Some(last) = self.switches[first..].last_mut() {
+        if let Some(last) = self.switches.latest_mut()[first..].last_mut() {
             last.mode_after = after.clone();
         }
     }
@@ -197,8 +199,9 @@ impl<'a> Recorder<'a> {
         }
         let step = self.steps.len();
         self.close_segment(t);
+        self.segments.pack_earlier();
         if self.keep == Keep::Last {
-            self.segments.clear();
+            self.segments.forget_before(0);
         }
         self.segments.push(Segment {
             t_start: t,
@@ -217,7 +220,7 @@ impl<'a> Recorder<'a> {
 
     fn close_segment(&mut self, t: f64) {
         let n_steps = self.steps.len();
-        if let Some(segment) = self.segments.last_mut() {
+        if let Some(segment) = self.segments.latest_mut().last_mut() {
             segment.t_end = t;
             segment.steps.1 = n_steps;
         }
@@ -250,8 +253,10 @@ impl<'a> Recorder<'a> {
         if self.keeps_steps() {
             self.push(t_stop, y);
         }
-        if self.keep == Keep::Last && self.switches.len() > 2 * LATEST_SWITCHES {
-            self.switches.drain(..self.switches.len() - LATEST_SWITCHES);
+        if self.keep != Keep::Last {
+            self.switches.pack_earlier();
+        } else if self.switches.len() > 2 * LATEST_SWITCHES {
+            self.switches.forget_before(LATEST_SWITCHES);
         }
     }
 
@@ -278,7 +283,8 @@ impl<'a> Recorder<'a> {
     #[cold]
     #[inline(never)]
     fn show_step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
-        if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.last()) {
+        if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.latest().last())
+        {
             let motion = (&segment.mode, &segment.discrete[..]);
             observed.step(&ObservedStep::new(motion, (t_stop, y), interpolant));
         }
@@ -353,14 +359,14 @@ impl<'a> Recorder<'a> {
         self.switches.push(switch);
     }
 
-    /// The switches so far.
+    /// The latest switches: all of them, or many.
     pub fn switches(&self) -> &[Switch] {
-        &self.switches
+        self.switches.latest()
     }
 
     /// The surfaces of the switches recorded at this time.
     pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
-        let latest = self.switches.iter().rev().take_while(|s| s.t == t);
+        let latest = self.switches().iter().rev().take_while(|s| s.t == t);
         let mut surfaces: Vec<usize> = latest.flat_map(|s| s.surfaces.iter().copied()).collect();
         surfaces.sort_unstable();
         surfaces.dedup();
@@ -369,7 +375,7 @@ impl<'a> Recorder<'a> {
 
     /// Are the last switches so many touches at this very time that they look endless?
     pub fn only_touches_at(&self, t: f64) -> bool {
-        let latest = self.switches.iter().rev();
+        let latest = self.switches().iter().rev();
         let touches = latest.take_while(|s| s.t == t && s.kind == Kind::Grazing);
         let recorded = touches.take(MOST_TOUCHES_AT_ONE_TIME).count();
         recorded > 0 && recorded + self.n_repeated >= MOST_TOUCHES_AT_ONE_TIME
@@ -388,7 +394,7 @@ impl<'a> Recorder<'a> {
                 && last.mode_after == *after
                 && last.surfaces[..] == *surfaces
         };
-        let repeats = before == after && self.switches.last().is_some_and(is_same);
+        let repeats = before == after && self.switches().last().is_some_and(is_same);
         if repeats {
             self.n_repeated += 1;
             if let Some(observed) = &mut self.observed {
@@ -400,10 +406,10 @@ impl<'a> Recorder<'a> {
 
     /// The surface that the last switches have touched, if they are so many touches of it that it may be at rest there.
     pub fn surface_touched_in_a_row(&self) -> Option<usize> {
-        let &[j] = &self.switches.last()?.surfaces[..] else {
+        let &[j] = &self.switches().last()?.surfaces[..] else {
             return None;
         };
-        let latest = self.switches.iter().rev();
+        let latest = self.switches().iter().rev();
         let touches = latest.take_while(|s| s.kind == Kind::Grazing && s.surfaces[..] == [j]);
         let recorded = touches.take(MOST_TOUCHES_IN_A_ROW).count();
         (recorded + self.n_repeated >= MOST_TOUCHES_IN_A_ROW).then_some(j)
@@ -415,12 +421,11 @@ impl<'a> Recorder<'a> {
             let t_start = self.segments.first().map_or(t_last, |s| s.t_start);
             let y0 = self.y0.clone();
             self.push(t_start, &y0);
-            for switch in std::mem::take(&mut self.switches) {
-                if switch.t > t_start && switch.t < t_last {
-                    self.push(switch.t, &switch.y_after);
-                }
-                self.switches.push(switch);
+            let switches = std::mem::take(&mut self.switches);
+            for switch in switches.iter().filter(|s| s.t > t_start && s.t < t_last) {
+                self.push(switch.t, &switch.y_after);
             }
+            self.switches = switches;
         }
         if self.t.last() != Some(&t_last) {
             self.push(t_last, x);
@@ -446,18 +451,18 @@ impl<'a> Recorder<'a> {
             self.list_switches(t_last, x);
         }
         let mut last_switched: Vec<usize> = Vec::new();
-        for switch in self.switches.iter().rev().take(SWITCHES_NAMED) {
+        for switch in self.switches().iter().rev().take(SWITCHES_NAMED) {
             last_switched.extend(&switch.surfaces);
         }
         last_switched.sort_unstable();
         last_switched.dedup();
         if self.keep == Keep::Last {
-            self.switches.clear();
+            self.switches = Switches::default();
         }
         if self.keep != Keep::Steps {
             // A result may be kept for long, beside many others.
-            self.switches.shrink_to_fit();
-            self.segments.shrink_to_fit();
+            self.switches.pack();
+            self.segments.pack();
             self.t.shrink_to_fit();
             self.y.shrink_to_fit();
         }

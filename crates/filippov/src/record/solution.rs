@@ -1,37 +1,17 @@
 //! The record of a run: steps, segments, switches.
 
-use smallvec::SmallVec;
-
 use crate::error::FieldError;
 use crate::event::UserZero;
 use crate::mode::Mode;
 use crate::motion::Projector;
 use crate::options::SlidingRule;
 use crate::record::section::Returns;
-use crate::record::{DecisionRecord, Held, Piece};
+use crate::record::{DecisionRecord, Held, Piece, Segment, Segments, Switches};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
 use crate::switch::{Kind, Switch};
 use crate::system::{Actions, PiecewiseSystem, Setting};
-
-/// A piece of constant mode.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Segment {
-    /// Start.
-    pub t_start: f64,
-    /// End.
-    pub t_end: f64,
-    /// The mode.
-    pub mode: Mode,
-    /// Index of the first step, and one past the last.
-    pub steps: (usize, usize),
-    /// lambda of the surfaces slid on, in their order, at the start; NaN for those in contact.
-    pub multipliers: SmallVec<[f64; 2]>,
-    /// The discrete states.
-    pub discrete: Vec<f64>,
-}
 
 /// A step, or its part up to an event.
 #[derive(Clone, Copy, Debug)]
@@ -64,9 +44,9 @@ pub struct Solution {
     /// States at `t`, one after the other.
     pub y: Vec<f64>,
     /// Switches in order of time.
-    pub switches: Vec<Switch>,
+    pub switches: Switches,
     /// Pieces of constant mode; they tile the time span.
-    pub segments: Vec<Segment>,
+    pub segments: Segments,
     /// Zeros of the user's events, per event.
     pub user_zeros: Vec<Vec<UserZero>>,
     /// Why the run ended.
@@ -103,6 +83,11 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// The state at the initial time.
+    pub fn first_state(&self) -> &[f64] {
+        &self.y0
+    }
+
     /// The state at the last time.
     pub fn last_state(&self) -> &[f64] {
         &self.y_last
@@ -119,7 +104,7 @@ impl Solution {
         t: f64,
         side: Side,
         y: &mut [f64],
-    ) -> Result<Option<&Mode>, FieldError> {
+    ) -> Result<Option<Mode>, FieldError> {
         let n = self.n_states;
         let (Some(first), Some(last)) = (self.segments.first(), self.segments.last()) else {
             return Ok(None);
@@ -130,13 +115,13 @@ impl Solution {
         match &self.y_end {
             Some(y_end) if side == Side::Right && t == last.t_end => {
                 y.copy_from_slice(y_end);
-                return Ok(Some(&self.mode));
+                return Ok(Some(self.mode.clone()));
             }
             _ => {}
         }
         if self.steps.is_empty() || side == Side::Left && t == first.t_start {
             y.copy_from_slice(&self.y0);
-            return Ok((t == first.t_start).then_some(&first.mode));
+            return Ok((t == first.t_start).then_some(first.mode));
         }
         let index = self.step_at(t, side);
         let step = self.steps[index];
@@ -146,14 +131,12 @@ impl Solution {
             return Ok(None);
         };
         crate::stepper::evaluate(step.basis, coefficients, n, theta, y);
-        let segment = self
-            .segments
-            .partition_point(|s| s.steps.1 <= index)
-            .min(self.segments.len() - 1);
-        let Segment { mode, discrete, .. } = &self.segments[segment];
+        let segment = self.segments.partition_point(|_, last| last <= index);
+        let segment = segment.min(self.segments.len() - 1);
+        let Segment { mode, discrete, .. } = self.segments.at(segment);
         if mode.codimension() > 0 && self.is_projected {
             let (set, signs) = (mode.sliding_set().collect::<Vec<_>>(), mode.signs());
-            let setting = Setting::new(&signs, discrete);
+            let setting = Setting::new(&signs, &discrete);
             let mut projector = Projector::new(n, system.n_surfaces());
             projector.project_onto_rates(system, &set, t, y, setting)?;
         }
@@ -163,7 +146,7 @@ impl Solution {
 
 impl Solution {
     /// The switches that a user sees, if these are the first `n` surfaces: not the crossings and touches of the others.
-    pub fn switches_of_first(&self, n: usize) -> impl Iterator<Item = &Switch> {
+    pub fn switches_of_first(&self, n: usize) -> impl Iterator<Item = Switch> + '_ {
         self.switches.iter().filter(move |s| {
             !matches!(s.kind, Kind::Crossing | Kind::Grazing)
                 || s.surfaces.iter().any(|&j| j < n)
@@ -208,15 +191,15 @@ impl Solution {
     }
 
     /// The segment that `t` belongs to.
-    pub fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
+    pub fn segment_at(&self, t: f64, side: Side) -> Option<Segment> {
         self.segments.get(self.segment_index(t, side)?)
     }
 
     /// Its place among the segments.
     pub(crate) fn segment_index(&self, t: f64, side: Side) -> Option<usize> {
         let before = match side {
-            Side::Right => self.segments.partition_point(|s| s.t_start <= t),
-            Side::Left => self.segments.partition_point(|s| s.t_start < t),
+            Side::Right => self.segments.partition_point(|t_start, _| t_start <= t),
+            Side::Left => self.segments.partition_point(|t_start, _| t_start < t),
         };
         (!self.segments.is_empty()).then(|| before.saturating_sub(1))
     }
@@ -300,15 +283,15 @@ impl Solution {
         if self.y_end.is_some() && t == self.t_last && side == Side::Right {
             return Ok(Some(self.last_piece()));
         }
-        let segment = &self.segments[index];
+        let segment = self.segments.at(index);
         let mut start = Vec::new();
         if segment.mode.codimension() == 1 {
             start.resize(self.n_states, 0.0);
             self.evaluate(system, segment.t_start, Side::Right, &mut start)?;
         }
         Ok(Some(Piece {
-            mode: segment.mode.clone(),
-            discrete: segment.discrete.clone(),
+            mode: segment.mode,
+            discrete: segment.discrete,
             sides: self.sides_before(index),
             near: segment.multipliers.to_vec(),
             start,
@@ -329,10 +312,10 @@ impl Solution {
 
     /// The side on which the motion was last before a segment, for the surfaces that it stays on; 0 if on none, and for the others.
     fn sides_before(&self, index: usize) -> Vec<i8> {
-        let mode = &self.segments[index].mode;
+        let mode = self.segments.at(index).mode;
         let mut sides = vec![0; mode.entries().len()];
         for j in mode.sliding_set() {
-            let earlier = self.segments[..index].iter().rev();
+            let earlier = self.segments.iter().take(index).rev();
             let mut entries = earlier.map(|segment| segment.mode.entries()[j]);
             sides[j] = entries.find(|&entry| entry != 0).unwrap_or(0);
         }

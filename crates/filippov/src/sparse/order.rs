@@ -18,7 +18,7 @@ pub struct Component {
 ///
 /// Reference: Cuthill, McKee, *Reducing the bandwidth of sparse symmetric matrices* (1969); George, Liu (1981).
 pub fn components(matrix: &SparseRows) -> Vec<Component> {
-    let neighbours = neighbours(matrix);
+    let neighbours = Neighbours::of(matrix);
     let mut walk = Walk {
         neighbours: &neighbours,
         reached: vec![usize::MAX; neighbours.len()],
@@ -31,10 +31,13 @@ pub fn components(matrix: &SparseRows) -> Vec<Component> {
         if is_placed[start] {
             continue;
         }
-        let mut order = walk.from(start);
-        for _ in 0..2 {
-            let end = order[order.len() - 1];
-            order = walk.from(end);
+        let mut order = Vec::new();
+        walk.from(start, &mut order);
+        if order.len() > 1 {
+            for _ in 0..2 {
+                let end = order[order.len() - 1];
+                walk.from(end, &mut order);
+            }
         }
         order.reverse();
         for (place, &i) in order.iter().enumerate() {
@@ -43,7 +46,7 @@ pub fn components(matrix: &SparseRows) -> Vec<Component> {
         }
         let distances = order.iter().flat_map(|&i| {
             let here = position[i];
-            let others = neighbours[i].iter().map(|&j| position[j]);
+            let others = neighbours.of_unknown(i).iter().map(|&j| position[j]);
             others.map(move |there| here.abs_diff(there))
         });
         let bandwidth = distances.max().unwrap_or(0);
@@ -66,42 +69,88 @@ pub fn coupled_blocks(matrix: &SparseRows) -> Vec<(Vec<usize>, SparseRows)> {
     parts.collect()
 }
 
-/// For each unknown the others it meets in a row or a column, those with few neighbours first.
-fn neighbours(matrix: &SparseRows) -> Vec<Vec<usize>> {
-    let mut lists: Vec<Vec<usize>> = vec![Vec::new(); matrix.n_rows()];
-    for i in 0..matrix.n_rows() {
-        for &j in matrix.columns(i).iter().filter(|&&j| j != i) {
-            lists[i].push(j);
-            lists[j].push(i);
+/// For each unknown the others that it meets in a row or a column, those with few neighbours first.
+struct Neighbours {
+    /// Where the list of each unknown starts in `lists`, and where it ends.
+    ranges: Vec<(usize, usize)>,
+    lists: Vec<usize>,
+}
+
+impl Neighbours {
+    fn of(matrix: &SparseRows) -> Self {
+        let n = matrix.n_rows();
+        let mut degrees = vec![0; n];
+        for i in 0..n {
+            for &j in matrix.columns(i).iter().filter(|&&j| j != i) {
+                degrees[i] += 1;
+                degrees[j] += 1;
+            }
         }
+        let mut ranges = Vec::with_capacity(n);
+        let mut start = 0;
+        for &degree in &degrees {
+            ranges.push((start, start));
+            start += degree;
+        }
+        let mut lists = vec![0; start];
+        let mut add = |i: usize, j: usize| {
+            lists[ranges[i].1] = j;
+            ranges[i].1 += 1;
+        };
+        for i in 0..n {
+            for &j in matrix.columns(i).iter().filter(|&&j| j != i) {
+                add(i, j);
+                add(j, i);
+            }
+        }
+        // An unknown that is met in a row and in a column is in the list twice.
+        for range in &mut ranges {
+            let list = &mut lists[range.0..range.1];
+            list.sort_unstable();
+            let mut kept = 0;
+            for k in 0..list.len() {
+                if k == 0 || list[k] != list[kept - 1] {
+                    list[kept] = list[k];
+                    kept += 1;
+                }
+            }
+            range.1 = range.0 + kept;
+        }
+        let degree = |j: usize| ranges[j].1 - ranges[j].0;
+        for &(start, end) in &ranges {
+            lists[start..end].sort_by_key(|&j| degree(j));
+        }
+        Neighbours { ranges, lists }
     }
-    for list in &mut lists {
-        list.sort_unstable();
-        list.dedup();
+
+    fn len(&self) -> usize {
+        self.ranges.len()
     }
-    let degrees: Vec<usize> = lists.iter().map(Vec::len).collect();
-    for list in &mut lists {
-        list.sort_by_key(|&j| degrees[j]);
+
+    fn of_unknown(&self, i: usize) -> &[usize] {
+        let (start, end) = self.ranges[i];
+        &self.lists[start..end]
     }
-    lists
 }
 
 /// Breadth-first walks.
 struct Walk<'a> {
-    neighbours: &'a [Vec<usize>],
+    neighbours: &'a Neighbours,
     /// The round in which an unknown was reached last.
     reached: Vec<usize>,
     round: usize,
 }
 
 impl Walk<'_> {
-    fn from(&mut self, start: usize) -> Vec<usize> {
+    /// Writes the unknowns that are reached from `start`, in order.
+    fn from(&mut self, start: usize, order: &mut Vec<usize>) {
         self.round += 1;
         self.reached[start] = self.round;
-        let mut order = vec![start];
+        order.clear();
+        order.push(start);
         let mut next = 0;
         while next < order.len() {
-            for &j in &self.neighbours[order[next]] {
+            for &j in self.neighbours.of_unknown(order[next]) {
                 if self.reached[j] != self.round {
                     self.reached[j] = self.round;
                     order.push(j);
@@ -109,6 +158,5 @@ impl Walk<'_> {
             }
             next += 1;
         }
-        order
     }
 }

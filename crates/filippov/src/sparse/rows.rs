@@ -21,6 +21,18 @@ impl SparseRows {
         }
     }
 
+    /// The same with room for so many rows and entries.
+    fn with_capacity(n_columns: usize, (rows, entries): (usize, usize)) -> Self {
+        let mut starts = Vec::with_capacity(rows + 1);
+        starts.push(0);
+        SparseRows {
+            starts,
+            columns: Vec::with_capacity(entries),
+            values: Vec::with_capacity(entries),
+            n_columns,
+        }
+    }
+
     /// A matrix from its dense rows; entries that are 0 are left out.
     pub fn from_dense(rows: &[Vec<f64>]) -> Self {
         let mut matrix = SparseRows::new(rows.first().map_or(0, Vec::len));
@@ -72,6 +84,7 @@ impl SparseRows {
     }
 
     /// Column and value of the entries of a row.
+    #[inline]
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.starts[i]..self.starts[i + 1];
         let values = &self.values[range.clone()];
@@ -82,6 +95,7 @@ impl SparseRows {
     }
 
     /// The columns of a row.
+    #[inline]
     pub fn columns(&self, i: usize) -> &[usize] {
         &self.columns[self.starts[i]..self.starts[i + 1]]
     }
@@ -150,7 +164,11 @@ impl SparseRows {
     /// Rows and columns of a square matrix that `kept` lists in increasing order.
     #[must_use]
     pub fn principal(&self, kept: &[usize]) -> SparseRows {
-        let mut block = SparseRows::new(kept.len());
+        if kept.len() == self.n_rows() {
+            return self.clone();
+        }
+        let n_entries = kept.iter().map(|&i| self.columns(i).len()).sum();
+        let mut block = SparseRows::with_capacity(kept.len(), (kept.len(), n_entries));
         for &i in kept {
             let place = |(j, value)| kept.binary_search(&j).ok().map(|place| (place, value));
             block.push_row(self.row(i).filter_map(place));
@@ -179,6 +197,11 @@ impl SparseRows {
         result
     }
 
+    /// Has a square matrix no entries beside the diagonal?
+    pub fn is_diagonal(&self) -> bool {
+        (0..self.n_rows()).all(|i| self.columns(i).iter().all(|&j| j == i))
+    }
+
     /// Are all values finite?
     pub fn is_finite(&self) -> bool {
         self.values.iter().all(|value| value.is_finite())
@@ -197,32 +220,43 @@ pub struct SparseProduct {
 impl SparseProduct {
     /// Finds the pattern of A B^T. Its diagonal is always kept.
     pub fn new(a: &SparseRows, b: &SparseRows) -> Self {
-        // For each column of B, the rows and entries that have it.
-        let mut users: Vec<Vec<(usize, u32)>> = vec![Vec::new(); b.n_columns()];
+        // For each column of B, the rows and entries that have it, one column after the other.
+        let mut ends = vec![0; b.n_columns() + 1];
+        b.columns.iter().for_each(|&column| ends[column + 1] += 1);
+        for column in 0..b.n_columns() {
+            ends[column + 1] += ends[column];
+        }
+        let starts = ends.clone();
+        let mut users = vec![(0, 0); b.columns.len()];
         for j in 0..b.n_rows() {
             for (offset, &column) in b.columns(j).iter().enumerate() {
-                users[column].push((j, (b.starts[j] + offset) as u32));
+                users[ends[column]] = (j, (b.starts[j] + offset) as u32);
+                ends[column] += 1;
             }
         }
-        let mut matrix = SparseRows::new(b.n_rows());
-        let mut terms = Vec::new();
+        let room = (a.n_rows(), a.n_entries().max(a.n_rows()));
+        let mut matrix = SparseRows::with_capacity(b.n_rows(), room);
+        let mut terms = Vec::with_capacity(a.n_entries());
+        let (mut met, mut columns) = (Vec::new(), Vec::new());
         for i in 0..a.n_rows() {
-            let mut met = Vec::new();
+            met.clear();
             for (offset, &column) in a.columns(i).iter().enumerate() {
                 let entry = (a.starts[i] + offset) as u32;
-                met.extend(users[column].iter().map(|&(j, other)| (j, entry, other)));
+                let users = &users[starts[column]..ends[column]];
+                met.extend(users.iter().map(|&(j, other)| (j, entry, other)));
             }
             met.sort_unstable();
-            let mut columns: Vec<usize> = met.iter().map(|term| term.0).collect();
+            columns.clear();
+            columns.extend(met.iter().map(|term| term.0));
             columns.extend((i < b.n_rows()).then_some(i));
             columns.sort_unstable();
             columns.dedup();
             let start = matrix.n_entries();
-            for (j, entry, other) in met {
+            for &(j, entry, other) in &met {
                 let slot = start + columns.partition_point(|&column| column < j);
                 terms.push((slot as u32, entry, other));
             }
-            matrix.push_row(columns.into_iter().map(|column| (column, 0.0)));
+            matrix.push_row(columns.iter().map(|&column| (column, 0.0)));
         }
         SparseProduct { terms, matrix }
     }

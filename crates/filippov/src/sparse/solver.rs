@@ -127,6 +127,13 @@ impl SparseSolver {
     pub fn solve(&mut self, x: &mut [f64]) {
         for (block, factor) in self.blocks.iter().zip(&mut self.factors) {
             let component = &block.joined;
+            if component.bandwidth == 0 {
+                for (place, &i) in component.unknowns.iter().enumerate() {
+                    let value = factor.solve_one(place, x[i] / self.row_scale[i]);
+                    x[i] = value / self.column_scale[i];
+                }
+                continue;
+            }
             self.buffer.clear();
             let scaled = component.unknowns.iter().map(|&i| x[i] / self.row_scale[i]);
             self.buffer.extend(scaled);
@@ -167,7 +174,16 @@ impl SparseSolver {
             return;
         }
         self.ordered = key.collect();
-        self.blocks = blocks(components(matrix));
+        self.blocks = match matrix.is_diagonal() {
+            true => vec![Block {
+                joined: Component {
+                    unknowns: (0..n).collect(),
+                    bandwidth: 0,
+                },
+                largest: 1,
+            }],
+            false => blocks(components(matrix)),
+        };
         self.n_operations_before = self.n_operations();
         self.factors = vec![BandLu::default(); self.blocks.len()];
         self.place = vec![0; n];

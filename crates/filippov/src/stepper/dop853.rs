@@ -22,13 +22,14 @@ const AS_OF_ORDER_FIVE: f64 = 5.0 / 8.0;
 /// make the continuous extension, for every step that is accepted.
 ///
 /// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), sections II.5 and II.10.
+#[repr(C)]
 pub struct Dop853 {
+    step: Step,
     /// Derivatives at the stages, at the end of the step, and at the stages of the extension.
     k: [Vec<f64>; 16],
     stage: Vec<f64>,
     /// The state of the last stage, which is at the end of the step too.
     last_stage: Vec<f64>,
-    step: Step,
 }
 
 impl Dop853 {

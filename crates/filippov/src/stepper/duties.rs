@@ -43,7 +43,8 @@ pub(crate) struct ExitSeries {
 ///
 /// Duties of every implementer:
 ///
-/// 1. `step` is the step that was attempted last, or is about to be; `step_mut` is the same one. Its `start_derivative` is
+/// 1. `step` is the step that was attempted last, or is about to be; `step_mut` is the same one. It is the first field of
+///    the type, in the order of C: then no branch leads to the steps of different methods. Its `start_derivative` is
 ///    kept through rejected attempts. Its `interpolant` has the time and the length of the attempt, also of a failed one.
 /// 2. `attempt` changes only the step, the memory of the method, the counters, and through the observer
 ///    ([`crate::motion::observer`]) what was seen of the exit functions. The observer is called after evaluations within

@@ -19,12 +19,13 @@ const AS_OF_ORDER_FIVE: f64 = 5.0 / 2.0;
 /// estimated by the distance to Euler's method.
 ///
 /// Reference: Dieci, Lopez, *SIAM J. Numer. Anal.* 47 (2009), section 5.
+#[repr(C)]
 pub struct Midpoint {
+    step: Step,
     /// The derivative at the start is that of the field there, and not that of the step before at its end.
     is_started: bool,
     stage: Vec<f64>,
     middle: Vec<f64>,
-    step: Step,
     /// The derivative at the end is that of the field there.
     is_end_evaluated: bool,
 }

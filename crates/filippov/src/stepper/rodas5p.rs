@@ -19,7 +19,9 @@ use crate::tolerances::EPS;
 /// extension has order 4.
 ///
 /// Reference: Steinebach, *BIT* 63:27 (2023); Hairer, Wanner, Solving ODEs II (1996), section IV.7.
+#[repr(C)]
 pub struct Rodas5p {
+    step: Step,
     /// The derivatives of the motion by its expression graph; differences of its field if there are none.
     jacobian: Option<Arc<MotionJacobian>>,
     linearisation: Linearisation,
@@ -29,7 +31,6 @@ pub struct Rodas5p {
     /// U_i, and behind them the multipliers.
     increments: [Vec<f64>; 8],
     stage: Vec<f64>,
-    step: Step,
     defect: Vec<f64>,
 }
 

@@ -35,6 +35,7 @@ pub(super) struct MotionSeries {
 ///
 /// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
 /// Taylor methods*, Exp. Math. 14 (2005).
+#[repr(C)]
 pub struct Taylor {
     pub(super) step: Step,
     n: usize,

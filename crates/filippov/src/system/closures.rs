@@ -22,7 +22,7 @@ use crate::tolerances::EPS;
 /// );
 /// let solution = Problem::new(&system, (0.0, 10.0), &[1.0]).solve()?;
 /// assert_eq!(solution.switches.len(), 1);
-/// assert!((solution.switches[0].t - 1.0 / 0.7).abs() < 1e-12);
+/// assert!((solution.switches.at(0).t - 1.0 / 0.7).abs() < 1e-12);
 /// # Ok::<(), filippov::Error>(())
 /// ```
 pub struct ClosureSystem<F, H> {

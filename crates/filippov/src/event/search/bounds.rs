@@ -188,7 +188,7 @@ fn exit_bound(guard: Guard, sliding: &[usize], root: &EnclosedRoot) -> Option<En
     let mut rate = Interval::ALL;
     let value = match guard {
         Guard::Multiplier { surface, end } => {
-            let position = sliding.iter().position(|&j| j == surface)?;
+            let position = sliding.binary_search(&surface).ok()?;
             if let Some(bounds) = root.rates.get(position) {
                 rate = bounds.scaled(-f64::from(end));
             }
