@@ -112,6 +112,7 @@ impl EndOnly {
             t: vec![times[1]],
             y: y_last.to_vec(),
             switches: Switches::default(),
+            last_switched: Vec::new(),
             segments,
             user_zeros: Vec::new(),
             stop: Stop::End,
