@@ -627,8 +627,8 @@ _WHY_LOST = {
 }
 
 
-# The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an action,
-# or a tick, is at its start, and a switch at its end.
+# The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
+# action, or a tick, is at its start, and a switch at its end.
 Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool]"
 
 

@@ -10,7 +10,8 @@ from typing import Any, ParamSpec, TypeVar
 
 __all__ = ["check_unknown", "did_you_mean", "drawing", "refuse_former"]
 
-_P, _R = ParamSpec("_P"), TypeVar("_R")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 # Keywords of earlier versions, and what to write now.

@@ -224,8 +224,8 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
     if "attractor" in result:
         shares = [f"{number}: {share:.3g}" for number, share in enumerate(result.attractor_size.values)]
         more = ", ..." if len(shares) > _MOST_NAMED else ""
-        shown = f"; shares of the points: {', '.join(shares[:_MOST_NAMED])}{more}" if shares else ""
-        say(given, f"basins:   {len(shares)} attractors{shown}")
+        of_points = f"; shares of the points: {', '.join(shares[:_MOST_NAMED])}{more}" if shares else ""
+        say(given, f"basins:   {len(shares)} attractors{of_points}")
     if given.csv is not None:
         rows = _write_csv(result, given.csv)
         say(given, f"written:  {given.csv}, {rows} rows")

@@ -11,6 +11,7 @@ Kostelich, Yorke, Int. J. Bifurcation and Chaos 1 (1991) 605 (images of a segmen
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,8 +131,12 @@ def manifold(
 
 def _sides(chosen: Sequence[int], length: float, show: Callable[[float, str], None]) -> Iterator[_Side]:
     """Yield each side, with a function to tell how much of its length is followed."""
+
+    def followed(k: int, side: int, done: float) -> None:
+        show((k + done / length) / len(chosen), f"side {side:+d}")
+
     for k, side in enumerate(chosen):
-        yield side, lambda done, k=k, side=side: show((k + done / length) / len(chosen), f"side {side:+d}")
+        yield side, partial(followed, k, side)
         show((k + 1) / len(chosen), f"side {side:+d}")
 
 

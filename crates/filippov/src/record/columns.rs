@@ -365,12 +365,12 @@ mod tests {
         Switch {
             t: y,
             y_before: SmallVec::from_slice(&[y, -0.0]),
-            y_after: SmallVec::from_slice(&[y, if k % 3 == 0 { 0.0 } else { -0.0 }]),
+            y_after: SmallVec::from_slice(&[y, if k.is_multiple_of(3) { 0.0 } else { -0.0 }]),
             kind: Kind::Crossing,
             surfaces: SmallVec::from_slice(&[k % 2]),
             mode_before: Mode::new(vec![1, -1]),
             mode_after: Mode::new(vec![-1, 1 - 2 * (k % 2) as i8]),
-            note: if k % 5 == 0 {
+            note: if k.is_multiple_of(5) {
                 "tick".into()
             } else {
                 String::new()

@@ -147,8 +147,10 @@ mod tests {
             (dx[0], dx[1]) = (x[1], t.sin() - x[0] - 1.3 * s[0]);
         };
         let system = ClosureSystem::new(2, 1, field, |_, x, h| h[0] = x[1]);
-        let mut options = Options::default();
-        options.keep = Keep::Last;
+        let options = Options {
+            keep: Keep::Last,
+            ..Options::default()
+        };
         let run = |t_end: f64| {
             let problem = Problem::new(&system, (0.0, t_end), &[1.0, 2.0]);
             problem.options(&options).solve().unwrap()
