@@ -205,7 +205,10 @@ class Cycle:
         start = itinerary.t0 % self.period
         if shooting.period is None or start == itinerary.t0:
             return self
-        return cycle_of(shooting.motions, itinerary.from_time(start), shooting.period)
+        try:
+            return cycle_of(shooting.motions, itinerary.from_time(start), shooting.period)
+        except ModelError:  # close to a bifurcation it is not found again, and stays where it is known
+            return self
 
     def inside(self) -> tuple[float, Array]:
         """Return a time and the state then in the middle of a piece, a long one that loses few dimensions.

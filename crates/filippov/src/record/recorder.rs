@@ -451,11 +451,12 @@ impl<'a> Recorder<'a> {
             self.list_switches(t_last, x);
         }
         let mut last_switched: Vec<usize> = Vec::new();
-        for switch in self.switches().iter().rev().take(SWITCHES_NAMED) {
-            last_switched.extend(&switch.surfaces);
+        if stats.here_since.is_some() {
+            let latest = self.switches().iter().rev().take(SWITCHES_NAMED);
+            last_switched.extend(latest.flat_map(|switch| &switch.surfaces));
+            last_switched.sort_unstable();
+            last_switched.dedup();
         }
-        last_switched.sort_unstable();
-        last_switched.dedup();
         if self.keep == Keep::Last {
             self.switches = Switches::default();
         }

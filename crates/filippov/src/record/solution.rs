@@ -76,7 +76,7 @@ pub struct Solution {
     pub(crate) y0: Vec<f64>,
     /// The state at `t_last`.
     pub(crate) y_last: Vec<f64>,
-    /// The surfaces of the last switches, also where switches are not kept.
+    /// The surfaces of the last switches, if there were very many in one place, also where switches are not kept.
     pub(crate) last_switched: Vec<usize>,
     /// The state at the end, if it jumped there.
     pub(crate) y_end: Option<Vec<f64>>,
