@@ -315,7 +315,7 @@ impl Solution {
         let mode = self.segments.at(index).mode;
         let mut sides = vec![0; mode.entries().len()];
         for j in mode.sliding_set() {
-            let earlier = self.segments.iter().take(index).rev();
+            let earlier = (0..index).rev().map(|k| self.segments.at(k));
             let mut entries = earlier.map(|segment| segment.mode.entries()[j]);
             sides[j] = entries.find(|&entry| entry != 0).unwrap_or(0);
         }
