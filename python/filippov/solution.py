@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
@@ -35,7 +36,7 @@ from filippov.switches import (
     symmetric,
 )
 from filippov.trace.tracer import trace_output
-from filippov.unknown import did_you_mean
+from filippov.unknown import did_you_mean, refuse_at_drawing
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -898,6 +899,7 @@ class Solution:
         """
         from filippov.plot import time_series
 
+        refuse_at_drawing("plot", options, list(inspect.signature(time_series).parameters))
         return time_series(self, ax=ax, states=states, dark=dark, **options)
 
     def __repr__(self) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 import inspect
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["check_unknown", "did_you_mean", "drawing", "refuse_former"]
+__all__ = ["check_unknown", "did_you_mean", "drawing", "refuse_at_drawing", "refuse_former"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -67,16 +67,27 @@ def drawing(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @functools.wraps(function)
     def checked(*arguments: _P.args, **keywords: _P.kwargs) -> _R:
-        for name in keywords:
-            if name not in known:
-                raise TypeError(
-                    f"{function.__name__}() got an unexpected keyword argument {name!r}"
-                    f"{did_you_mean(name, known)}; it takes {', '.join(known[1:])}; for a size, a title, "
-                    "or other colours, give axes of your own as ax=, or change those that are returned"
-                )
+        refuse_at_drawing(function.__name__, keywords, known)
         return function(*arguments, **keywords)
 
     return checked
+
+
+def refuse_at_drawing(function: str, keywords: Iterable[str], known: Sequence[str]) -> None:
+    """Refuse keywords that a function with these parameters does not take, the first of which is what it draws.
+
+    Raises
+    ------
+    TypeError
+        If there is one.
+    """
+    for name in keywords:
+        if name not in known:
+            raise TypeError(
+                f"{function}() got an unexpected keyword argument {name!r}{did_you_mean(name, known)}; it takes "
+                f"{', '.join(known[1:])}; for a size, a title, or other colours, give axes of your own as ax=, "
+                "or change those that are returned"
+            )
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -147,7 +147,7 @@ def test_a_black_box_is_computed_by_the_kernel(at_server: Any) -> None:
     settle(page)
     assert front(page, "run.t.length") == 50
     assert {"describe", "run", "portrait"} == {request["kind"] for request in asked}
-    assert "portrait: not played" in page.locator(".line").inner_text(), "what is missing is said"
+    assert page.get_by_text("portrait: not played").count() == 1, "what is missing is said"
     page.get_by_role("slider", name="parameter F").press("ArrowRight")
     settle(page)
     assert [request for request in asked if request["kind"] == "run"][-1]["params"]["F"] > 0.4
