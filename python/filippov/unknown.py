@@ -74,7 +74,7 @@ def drawing(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def refuse_at_drawing(function: str, keywords: Iterable[str], known: Sequence[str]) -> None:
-    """Refuse keywords that a function with these parameters does not take, the first of which is what it draws.
+    """Refuse keywords that a function with these parameters does not take; the first is what it draws.
 
     Raises
     ------
@@ -84,9 +84,9 @@ def refuse_at_drawing(function: str, keywords: Iterable[str], known: Sequence[st
     for name in keywords:
         if name not in known:
             raise TypeError(
-                f"{function}() got an unexpected keyword argument {name!r}{did_you_mean(name, known)}; it takes "
-                f"{', '.join(known[1:])}; for a size, a title, or other colours, give axes of your own as ax=, "
-                "or change those that are returned"
+                f"{function}() got an unexpected keyword argument {name!r}{did_you_mean(name, known)}; "
+                f"it takes {', '.join(known[1:])}; for a size, a title, or other colours, give axes of "
+                "your own as ax=, or change those that are returned"
             )
 
 
