@@ -22,7 +22,7 @@ After = Callable[[float, Array], tuple[str, Array]]
 
 
 class Exit(NamedTuple):
-    """A zero that ends a piece, in one direction, and what follows."""
+    """A function whose zero, passed in one direction, ends a piece; and the piece that comes next."""
 
     zero: Callable[[float, Any], Any]
     direction: int

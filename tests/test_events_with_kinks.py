@@ -231,7 +231,7 @@ def test_a_floor_that_a_root_touches_has_no_zero_there(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_floor_of_a_root_that_begins_at_the_start_changes_in_a_long_step(method: str) -> None:
-    """A root has no bounds where it begins: that says nothing about its zeros farther on."""
+    """The slope of a root is infinite where the root begins. Its zeros farther on are found all the same."""
     for of in (lambda t: np.sqrt(np.abs(t)), lambda t: np.sqrt(np.maximum(t, 0))):
         sol = fl.solve_ivp(
             lambda t, x: [1.0],

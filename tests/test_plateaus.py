@@ -59,7 +59,7 @@ COMPARISONS: dict[str, tuple[Condition, float]] = {
     "product with ramp": (lambda x: (x + 1) * np.maximum(x - 1, 0) > 0, 1.5),
     "two ramps": (lambda x: np.maximum(x - 1, 0) + np.maximum(x - 2, 0) > 0, 1.5),
     "rint": (lambda x: np.rint(x) >= 1, 2.0),
-    "floor > 0, as where": (lambda x: np.where(np.floor(x) > 0, 1, 0), 1.5),
+    "np.where with floor(x) > 0": (lambda x: np.where(np.floor(x) > 0, 1, 0), 1.5),
     "clock and sign": (lambda x: np.floor(x / 1.25) + 0.5 * np.sign(x - 0.5) > 0.5, 1.25),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias, overload
@@ -271,8 +272,9 @@ class _RowsOfRun(Sequence[tuple[Any, ...]]):
             self._rows = self._made()
         return self._rows
 
+    @abstractmethod
     def _made(self) -> list[tuple[Any, ...]]:
-        raise NotImplementedError
+        """Return the rows, from the core."""
 
 
 class SwitchRows(_RowsOfRun):

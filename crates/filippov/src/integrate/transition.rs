@@ -999,7 +999,7 @@ fn find_clinging(
     Ok(found.filter(|found| found.leaves || !leaves))
 }
 
-/// Records the way of a motion that is held to surfaces, and decides what follows.
+/// Records how surfaces came to hold the motion, and decides the mode in which it goes on.
 fn follow_clinging(
     integrator: &mut Integrator<'_>,
     clinging: Clinging,

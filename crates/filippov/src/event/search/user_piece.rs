@@ -8,13 +8,13 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::series::{FirstZero, Series, NO_TERMS};
+use crate::event::series::{Series, NO_TERMS};
 use crate::event::tube::Tube;
 use crate::event::{SmoothParts, UserFunction};
 use crate::locate::refine;
 use crate::mode::Signs;
 use crate::motion::CurrentMotion;
-use crate::stepper::{powers_of_nested, shift, Basis, Interpolant};
+use crate::stepper::{powers_of_nested, Basis, Interpolant};
 use crate::system::Setting;
 use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH_BESIDE_ROOT, EPS, POLE, ROUNDING};
 
@@ -175,45 +175,22 @@ impl<'f> Along<'f> {
         start.from == 0.0 && series.has_sign(start.sign, ROUNDING * size)
     }
 
-    /// What the series tells of the piece, if that is far from rounding: the first zero, or that there is none. It is expanded
-    /// at the start of the piece, and divided by the distance if it is zero there.
-    fn told_by_series(&self, search: &StepSearch, start: Start, to: f64) -> Option<Outcome> {
-        let rows = self.series.as_ref()?;
-        let noise = ROUNDING * rows.iter().map(|c| c.abs()).sum::<f64>();
-        let Start {
-            from,
-            divided,
-            sign,
-            ..
-        } = start;
-        let length = to - from;
-        let mut on_piece = rows.clone();
-        shift(&mut on_piece, from);
-        let mut power = sign;
-        for c in &mut on_piece {
-            *c *= power;
-            power *= length;
-        }
-        let order = usize::from(divided);
-        if divided && (on_piece[0].abs() > noise || on_piece.len() == 1) {
-            return None;
-        }
-        let series = Series::new(&on_piece).divided(order);
+    /// The only zero in the step, from its start on, if the series has one that is far from rounding.
+    fn only_zero(&self, search: &StepSearch, start: Start) -> Option<f64> {
+        let is_whole = start.from == 0.0 && !start.divided;
+        let rows = self.series.as_ref().filter(|_| is_whole)?;
+        let signed: SmallVec<[f64; 32]> = rows.iter().map(|c| start.sign * c).collect();
+        let series = Series::new(&signed);
+        let size: f64 = rows.iter().map(|c| c.abs()).sum();
+        let noise = ROUNDING * size;
         let [left, right] = series.ends();
-        if left <= noise || right.abs() <= noise {
+        if left <= noise || right >= -noise || !series.has_one_zero(noise) {
             return None;
         }
-        let FirstZero::Between { lo, hi, guess } = (match series.first_zero(1.0, noise, 0.0).0 {
-            FirstZero::Nowhere => return Some(Outcome::Nothing),
-            found => found,
-        }) else {
-            return None;
-        };
         let interpolant = search.stepper.interpolant();
-        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0) / length;
-        let at = from + length * series.only_zero((lo, hi), guess, width).0;
-        // One at the end of the search needs a closer look.
-        (to - at > 4.0 * search.together(interpolant.dt)).then_some(Outcome::At(at))
+        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
+        let (at, _) = series.only_zero((0.0, 1.0), left / (left - right), width);
+        Some(at)
     }
 
     /// How well the function is known at a point of the step; 0 for a smooth one, of which its values tell.
@@ -269,8 +246,13 @@ impl StepSearch<'_, '_> {
         is_last: bool,
     ) -> Result<Outcome, FieldError> {
         let beside = self.together(self.stepper.interpolant().dt);
-        if let Some(outcome) = along.told_by_series(self, start, to) {
-            return Ok(outcome);
+        // One at the end of the search needs a closer look.
+        let expected = along.only_zero(self, start);
+        if let Some(at) = expected.filter(|at| (at - to).abs() > 4.0 * beside) {
+            return Ok(match at < to {
+                true => Outcome::At(at),
+                false => Outcome::Nothing,
+            });
         }
         let Start {
             from,
