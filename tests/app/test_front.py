@@ -355,9 +355,14 @@ def test_the_script_repeats_the_run(open_page: Any, tmp_path: Path) -> None:
     path.write_text(script, encoding="utf-8")
     root = str(Path(fl.__file__).parent.parent)
     done = subprocess.run(
-        [sys.executable, str(path)], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": root}
+        [sys.executable, str(path)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": root},
     )
     assert done.returncode == 0, done.stderr
+    assert (tmp_path / "picture.png").exists()
     kinds, end = json.loads(done.stdout.split("##")[1])
     assert kinds == front(page, "run.switches.map(s => s.kind)")
     np.testing.assert_allclose(end, front(page, "run.y.slice(-2)"), atol=1e-8)

@@ -43,7 +43,7 @@ struct Node {
 }
 
 enum Way {
-    Full(Elimination),
+    Full(Box<Elimination>),
     Iteration,
     /// The sparse matrix is factored, or its transpose, if it has an inverse.
     Sparse(bool),
@@ -141,7 +141,7 @@ impl Collocation {
                 *unit = power_of_two_below(largest);
             }
             if let Some(elimination) = self.factor_full(nodes) {
-                self.way = Way::Full(elimination);
+                self.way = Way::Full(Box::new(elimination));
                 return;
             }
             self.units.fill(1.0);
