@@ -74,6 +74,7 @@ def test_a_member_that_fails_stops_no_other(system: fl.System) -> None:
     assert runs[1].message != runs[0].message
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_events_and_wanted_times(system: fl.System) -> None:
     times = np.linspace(0, 30, 7)
     runs = system.ensemble((0, 30), starts(20), events=lambda t, x: x[0], t_eval=times, dense_output=False)
@@ -153,6 +154,7 @@ def test_functions_that_hold_for_some_parameters_only(fun: Any) -> None:
     np.testing.assert_array_equal(runs.y, [member.y[:, -1] for member in runs])
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_an_event_that_cannot_be_traced_reads_the_parameters_of_its_member(system: fl.System) -> None:
     def level(t: float, x: Any, F: float) -> float:
         return number(x[0]) - F

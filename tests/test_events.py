@@ -85,6 +85,7 @@ def test_called_events_equal_traced_ones() -> None:
     np.testing.assert_allclose(called.t_events[0], traced.t_events[0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 @pytest.mark.parametrize("wrap", [lambda g: g, lambda g: lambda t, y: number(g(number(t), y))])
 @pytest.mark.parametrize("count", [2, 5, 20])
 def test_many_zeros_in_one_step(count: int, wrap: Any) -> None:

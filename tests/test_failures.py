@@ -114,6 +114,7 @@ def test_traceback_leads_to_the_line_of_the_user() -> None:
     assert trace.tb_frame.f_code.co_name == "field"
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_surface_and_event_that_raise() -> None:
     def late(t: float, x: Any) -> Any:
         if number(t) > 0.5:
@@ -318,6 +319,7 @@ def _field_fails(t: float, x: Any) -> Any:
     return [x[1], -9.8 + 0.0 * _fails_late(t, x)]
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 @pytest.mark.parametrize(
     ("fun", "options", "what"),
     [

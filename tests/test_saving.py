@@ -83,6 +83,7 @@ def test_systems_come_back_as_they_were(name: str, tmp_path: Path) -> None:
         assert [switch.note for switch in first.switches] == [switch.note for switch in second.switches]
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_a_loaded_system_takes_other_values_and_black_events(tmp_path: Path) -> None:
     friction().save(tmp_path / "a.flp")
     copy = fl.System.load(tmp_path / "a.flp")

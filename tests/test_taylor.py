@@ -167,6 +167,7 @@ def test_dense_output_is_as_accurate_as_the_steps(tolerance: float) -> None:
     assert np.abs(sol.sol(times) - exact.sol(times)).max() < 5 * tolerance + 1e-12
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_a_called_event_is_found_between_the_ends_of_long_steps() -> None:
     """Sampled in pieces: a double crossing in the middle of a step of a circle."""
 

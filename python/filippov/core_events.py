@@ -57,16 +57,15 @@ def core_events(
         if isinstance(traced, TracedEvent):
             events.append((traced, spec.direction, spec.terminal, spec.name))
             continue
-        if traced:
-            warn_user([sampled(f"events: entry {index} ({spec.name})", traced)])
+        warn_user([sampled(f"events: entry {index} ({spec.name})", traced)])
         events.append((g, spec.direction, spec.terminal, spec.name))
     return prepared, events
 
 
-def sampled(what: str, kink: str) -> str:
-    """Return the warning for a function that has no bounds because of a kink."""
+def sampled(what: str, why: str) -> str:
+    """Return the warning for a function that has no bounds."""
     return (
-        f"{what} is sampled: it has {kink}. Its zeros are located, but two of them that are close together "
+        f"{what} is sampled: {why}. Its zeros are located, but two of them that are close together "
         "within a step may both be missed; a small max_step makes it less likely"
     )
 
@@ -84,7 +83,7 @@ def _traced(
     No Python is called during the run for a traced event.
     """
     if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
-        return ""
+        return "the right-hand side is a black box"
 
     def key() -> Hashable | None:
         read = fingerprint(spec.g, args)

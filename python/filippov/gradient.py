@@ -351,5 +351,5 @@ class _Sum:
             if isinstance(there, TracedSystem):
                 return there
         if isinstance(found, str):
-            raise InputError(f"{name}: its derivative is not known: it has {found}")
+            raise InputError(f"{name}: its derivative is not known: {found}")
         return found

@@ -331,7 +331,7 @@ class Laws:
 
     def reads_any(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states."""
-        return bool(self.names) and bool(self._read(tracer, node))
+        return bool(self.names or tracer.own_levels) and bool(self._read(tracer, node))
 
     def is_clock(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression is affine in time, with coefficients that no run changes."""
@@ -340,7 +340,8 @@ class Laws:
 
     def whole(self, tracer: Tracer, node: int) -> int:
         """Return an expression of whole numbers with the sign of one that stands still between jumps."""
-        is_real = any(self._values[index] == "real" for index in self._read(tracer, node))
+        known = [index for index in self._read(tracer, node) if index < len(self._values)]
+        is_real = any(self._values[index] == "real" for index in known)
         return self.sign(tracer, node) if is_real else node
 
     def may_be_idle(self, tracer: Tracer) -> bool:
@@ -418,7 +419,7 @@ class Laws:
         return builder.unary("negative", builder.binary("multiply", from_below, from_above))
 
     def _read(self, tracer: Tracer, node: int) -> list[int]:
-        """Return the indices of the discrete states in an expression."""
+        """Return the indices of the discrete states in an expression, own levels behind all laws."""
         read = tracer.builder.parameters_read(node)
         return [index - self.first for index in read if index >= self.first]
 

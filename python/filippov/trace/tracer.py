@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
 
 # What a warning says of an event or a section with a law that the run does not follow.
-OWN_LAW = "a floor, a relay or a table that the run does not follow"
+OWN_LAW = "it has a floor, a relay or a table that the run does not follow"
 # The roles of functions whose zeros are switches: a truth value has none.
 _CHANGES_SIGN = ("surfaces[", "resets[")
 
@@ -262,8 +262,7 @@ def trace_event(
     Returns
     -------
     TracedEvent or str
-        The event. If `g` must be called as a Python function: what it has that was not traced, for a
-        warning, or an empty text if it cannot be traced at all.
+        The event. If `g` must be called as a Python function: why, as the end of a sentence, for a warning.
     """
     found = _beside(traced, g, args, t0, y0, parameters, is_event=True)
     return found if isinstance(found, str) else found[0]
@@ -301,7 +300,7 @@ def trace_output(
         return found
     _, tracer, node = found
     if tracer.guards:
-        return "a condition on parameters"
+        return "it has a condition on parameters"
     if tracer.own_levels:
         return OWN_LAW
     field = [node] + [tracer.builder.constant(0.0)] * (tracer.n_states - 1)
@@ -343,9 +342,9 @@ def _beside(
         if not own.laws.names:
             verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)
     except TraceError as error:
-        return OWN_LAW if isinstance(error.__cause__, NoSuchLaw) else ""
-    except ModelError:
-        return ""
+        return OWN_LAW if isinstance(error.__cause__, NoSuchLaw) else _why(error)
+    except ModelError as error:
+        return _why(error)
     return event, tracer, node
 
 
@@ -434,6 +433,11 @@ def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...],
     if tracer.builder.as_constant(node) is not None:
         raise ModelError(f"{role} is constant: a switching function must depend on t or x")
     return tracer.builder.declare_surface(node)
+
+
+def _why(error: TraceError | ModelError) -> str:
+    """Return the reason of an error about an event as the end of a sentence about it."""
+    return f"it {str(error).partition(chr(10))[0].removeprefix('event ')}"
 
 
 def _adopt_laws(tracer: Tracer, field: list[int], g: Callable[..., Any], args: tuple[Any, ...]) -> None:
