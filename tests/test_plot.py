@@ -231,3 +231,18 @@ def test_a_surface_in_space_needs_axes_in_space() -> None:
     _, flat = pyplot.subplots()
     with pytest.raises(TypeError, match='projection="3d"'):
         fl.plot.surface(parts, ax=flat)
+
+
+@pytest.mark.parametrize("size", [(4.0, 3.0), (6.4, 5.0), (10.0, 8.0)])
+@pytest.mark.parametrize("view", [(30.0, -60.0), (60.0, -30.0), (30.0, -80.0)])
+def test_the_legend_in_space_touches_no_axis(size: tuple[float, float], view: tuple[float, float]) -> None:
+    problem = fl.problems.get("relay_feedback_cycle")
+    relay = fl.System(problem.fun, n=3, args=problem.args, states=("place", "speed", "acceleration"))
+    figure = pyplot.figure(figsize=size, layout="constrained")
+    ax = figure.add_subplot(projection="3d", elev=view[0], azim=view[1])
+    fl.plot.phase3d(relay.solve((0.0, 5.9), problem.y0), ax=ax)
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    beside = ax.get_legend().get_window_extent(renderer)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        assert not axis.get_tightbbox(renderer).overlaps(beside), axis

@@ -43,7 +43,7 @@ def system(
     Parameters
     ----------
     fun : callable
-        The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
+        The right-hand side. Every argument after ``(t, x)`` with a numeric default is a parameter.
     n, states, surfaces, resets, outputs, discrete
         As for `System`.
     params : dict, optional

@@ -45,7 +45,7 @@ class Reset:
     name : str, optional
         Name in tables and messages. Default: the name of `map`.
     times : array_like, optional
-        Times of the reset, instead of `h`. They are ends of steps, and never searched for.
+        Times of the reset, instead of `h`. The integrator steps exactly onto each of them.
     period, phase : float, optional
         The reset happens at the times ``phase + k * period``, k any whole number, instead of at `h`.
     set : dict of str to float or callable, optional

@@ -76,8 +76,8 @@ class System(Points, Saving):
 
     Notes
     -----
-    A system is picklable, and can be written to a file (`save`, `load`): the traced expression travels, not
-    the Python function.
+    Systems can be pickled and written to files (`save`, `load`). What is stored is the traced expression, so
+    the Python function need not be importable at the other end.
 
     Examples
     --------

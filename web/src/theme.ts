@@ -1,6 +1,6 @@
 /**
  * Colours and letters. The colours of curves are those of Okabe and Ito, Color Universal Design (2008), as in the
- * figures of the Python package; what colour says is said by width, line style or shape too.
+ * figures of the Python package; width, line style or shape repeat what colour shows.
  */
 
 export interface Theme {

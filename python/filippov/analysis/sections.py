@@ -38,10 +38,10 @@ class Section:
     Parameters
     ----------
     where : callable, str or int
-        ``h_P(t, x)``, written like an event: parameters of the system that its signature names are handed
-        over. Or a surface of the system, by its printed name or its index: then the returns are the arrivals
-        at that surface, whether the motion crosses it, begins to slide on it, or is reset there. A function
-        that is a surface of the system is taken as that surface.
+        ``h_P(t, x)``, written like an event: it may take parameters of the system by name. Or a surface of
+        the system, by its printed name or its index: then the returns are the arrivals at that surface,
+        whether the motion crosses it, begins to slide on it, or is reset there. If the function coincides
+        with a surface of the system, the section is that surface.
     direction : {0, 1, -1, "both", "up", "down"}, optional
         Which passages count: upwards (from ``h_P < 0``), downwards, or both (default).
     kind : str, optional
@@ -367,7 +367,7 @@ def _function_place(
     y0: Array,
     values: dict[str, float],
 ) -> Place:
-    """Trace a function of the section; one that is a surface of the system is that surface."""
+    """Trace a function of the section; one that coincides with a surface of the system is that surface."""
     from filippov.trace import OWN_LAW, trace
 
     n = prepared.core.n_states

@@ -75,9 +75,8 @@ def sweep(
     units : mapping, optional
         Units of states, of parameters, and of the time under ``"t"``; they become attributes.
     store : str or path, optional
-        A folder. Every finished chunk of points is written there, and a sweep that was interrupted, however
-        it ended, goes on from there when it is called again with the same arguments. The result is a Zarr
-        group.
+        A folder. Every finished chunk of points is written there. Call the sweep again with the same
+        arguments, and it resumes from there, however it was interrupted. The result is a Zarr group.
     executor : Executor, optional
         Where chunks are run, with ``submit`` as in `concurrent.futures`, or a Dask client. By default on
         native threads of this process.
@@ -285,7 +284,7 @@ def run_plan(
         done = int(np.count_nonzero(partial.reason.values < REASONS.index("not_run")))
         raise Interrupted(
             f"{done} of {plan.n_points} points were begun; what was computed is in `partial` of this "
-            "exception. A sweep with store= goes on when it is called again.",
+            "exception. A sweep with store= resumes if you call it again.",
             partial=partial,
         ) from None
     finally:

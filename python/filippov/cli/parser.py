@@ -35,7 +35,7 @@ a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
 
   @fl.system(states=("y", "v"))
-  def oscillator(t, x, F=0.4, omega=1/3):    # what has a number as default is a parameter
+  def oscillator(t, x, F=0.4, omega=1/3):    # F and omega are parameters: their defaults are numbers
       y, v = x
       return v, -y + np.sin(omega*t) - F*np.sign(v)
 

@@ -46,6 +46,9 @@ SMOOTH_WIDTH = 1.2
 SLIDING_WIDTH = 3.0
 # How far colours after the seventh are mixed with the ink, and those after the fourteenth with the ground.
 _SHADES = (0.0, 0.45, 0.5)
+# How far numbers and names of an axes in space reach beyond it at most, in points: their distance from the
+# edge of the cube does not depend on the size of the figure.
+_BEYOND_IN_SPACE = 54.0
 # A legend with more entries has two columns.
 _ENTRIES_OF_A_COLUMN = 12
 # Surfaces are named above the modes where the names are short.
@@ -301,8 +304,7 @@ def draw_legend(
     handles = list({entry.get_label(): entry for entry in handles}.values())
     place: dict[str, Any] = {"loc": legend, "ncols": 1 + (len(handles) > _ENTRIES_OF_A_COLUMN)}
     if legend is True or legend == "beside":
-        beside = 1.12 if hasattr(ax, "zaxis") else 1.0  # in space numbers stand beyond the axes
-        place |= {"loc": "upper left", "bbox_to_anchor": (beside, 1.0)}
+        place |= {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "bbox_transform": _beside(ax)}
     elif legend == "below":
         place |= {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": min(4, len(handles))}
     elif legend == "above":
@@ -317,6 +319,15 @@ def draw_legend(
     drawn.set_alignment("left")
     for text in drawn.get_texts():
         text.set_color(chosen.ink)
+
+
+def _beside(ax: Any) -> Any:
+    """Return the transformation of places beside an axes: in space its numbers and names stand beyond it."""
+    from matplotlib.transforms import ScaledTranslation
+
+    if not hasattr(ax, "zaxis"):
+        return ax.transAxes
+    return ax.transAxes + ScaledTranslation(_BEYOND_IN_SPACE / 72, 0.0, ax.figure.dpi_scale_trans)
 
 
 def _places_of_legends() -> list[str]:
