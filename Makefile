@@ -15,8 +15,9 @@ DOCS_STAMP := $(STAMPS)/docs
 BUILD_STAMP := $(STAMPS)/build
 
 RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
-# maturin installs into the environment named here; a Conda environment around must not interfere.
-MATURIN := env -u CONDA_PREFIX VIRTUAL_ENV="$(abspath $(VENV))" $(BIN)/maturin
+# maturin installs into the environment named here; a Conda environment around must not interfere. With `--zig` it
+# takes the compiler that the package `ziglang` of this environment has.
+MATURIN := env -u CONDA_PREFIX VIRTUAL_ENV="$(abspath $(VENV))" CARGO_ZIGBUILD_PYTHON_PATH="$(abspath $(PY))" $(BIN)/maturin
 # What `make test-fast` runs in Python: files of a second or two that together reach every stage, namely tracing,
 # arguments, itineraries against references, order, what wins at equal times, events, resets, sliding on
 # intersections, discrete states, the record, and runs that fail.

@@ -274,10 +274,12 @@ def test_a_reset_that_forgets_the_state_keeps_the_delay() -> None:
     ids=["harmonic", "two relays"],
 )
 def test_one_cycle_of_a_family_is_neutral(fun: Any, period: Any) -> None:
-    cycle = fl.limit_cycle(fl.System(fun, n=2), [1.0, 0.3])
+    system = fl.System(fun, n=2)
+    cycle = fl.limit_cycle(system, [1.0, 0.3])
     assert abs(cycle.period - period(cycle.y0)) < 1e-9
     np.testing.assert_allclose(np.abs(cycle.multipliers), 1.0, atol=1e-6)
     assert "neutral" in repr(cycle)
+    assert ("modes" in repr(cycle)) == bool(system.surfaces), "without surfaces there are no modes to name"
 
 
 def test_a_cycle_of_a_family_has_no_derivative() -> None:

@@ -173,6 +173,7 @@ def test_system_solves_with_other_parameters() -> None:
     np.testing.assert_array_equal(by_keyword.y, outside.y)
     assert not np.array_equal(by_keyword.y[:, -1], system.solve((0, 20), [1.0, 2.0]).y[:, -1])
     assert "F=0.4" in repr(system)
+    assert "n not known yet" in repr(fl.System(lambda t, x: [-x[0]]))
 
 
 def test_decorator() -> None:

@@ -148,7 +148,9 @@ def test_unknown_keyword_gets_a_suggestion() -> None:
 def test_keywords_that_only_scipy_has() -> None:
     with pytest.warns(UserWarning, match=r"^jac:"):
         fl.solve_ivp(relay, (0, 1), [1.0], jac=None)
-    fl.solve_ivp(relay, (0, 1), [1.0], vectorized=True)
+    assert fl.solve_ivp(relay, (0, 1), [1.0], vectorized=True).success
+    with pytest.raises(fl.InputError, match=r"^vectorized: True or False"):
+        fl.solve_ivp(relay, (0, 1), [1.0], vectorized="yes")
 
 
 @pytest.mark.parametrize("fun", [None, 3, "f"])

@@ -624,7 +624,7 @@ class Solution:
         return values
 
     def multipliers(self, t: npt.ArrayLike | None = None) -> Array:
-        """Return the multipliers of the sliding surfaces; see `DenseSolution.multipliers`.
+        """Return the multipliers of sliding surfaces, NaN for the others; see `DenseSolution.multipliers`.
 
         Parameters
         ----------

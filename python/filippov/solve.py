@@ -170,6 +170,10 @@ def solve_ivp(
 
     Notes
     -----
+    SciPy's ``vectorized=True`` is accepted, so that old calls run unchanged: `fun` is called with `y` of
+    shape (n,), and the result is the same. Its `jac`, `jac_sparsity`, `lband`, `uband` and `min_step` have no
+    effect and a warning: derivatives come from the traced function.
+
     Backward time, ``t1 < t0``, is allowed only without surfaces: Filippov flow is not reversible.
 
     A function that is solved again is not traced again if nothing that it reads has changed. For one that

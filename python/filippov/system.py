@@ -601,7 +601,7 @@ class System(Points, Saving):
         return self._states if self._states is not None else numbered_states(n)
 
     def __repr__(self) -> str:
-        parts = [f"n={self._n}"] if self._n is not None else []
+        parts = [f"n={self._n}" if self._n is not None else "n not known yet"]
         parts += [f"{name}={value:g}" for name, value in self._params.items()]
         if self._prepared is not None:
             parts.append(f"surfaces=[{', '.join(self._prepared.surfaces)}]")

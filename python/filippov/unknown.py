@@ -8,6 +8,10 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+
+from filippov.errors import InputError
+
 __all__ = ["check_unknown", "did_you_mean", "drawing", "refuse_at_drawing", "refuse_former"]
 
 _P = ParamSpec("_P")
@@ -30,13 +34,15 @@ def check_unknown(
     parameters: Iterable[str] = (),
     *others: Callable[..., Any],
 ) -> None:
-    """Refuse unknown keywords of `function` with a suggestion. SciPy's own are ignored.
+    """Refuse unknown keywords of `function` with a suggestion. SciPy's own are ignored, with a warning.
 
     A system takes `parameters` too; `others` are functions that the keywords are handed on to.
     """
     refuse_former(unknown, function, parameters)
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
+            if not isinstance(unknown[name], bool | np.bool_):
+                raise InputError(f"vectorized: True or False is needed, not {unknown[name]!r}")
             continue
         if name not in _SCIPY_ONLY:
             takers = (function, *others)
@@ -45,7 +51,7 @@ def check_unknown(
             of_system = f"; the parameters of the system are {', '.join(parameters)}" if parameters else ""
             what = f"{function.__name__}() got an unexpected keyword argument {name!r}"
             raise TypeError(f"{what}{hint}{of_system}")
-        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
+        warnings.warn(f"{name}: SciPy's argument has no effect here", UserWarning, stacklevel=3)
 
 
 def refuse_former(names: Iterable[str], function: Callable[..., Any], parameters: Iterable[str] = ()) -> None:

@@ -276,10 +276,11 @@ class Cycle:
         largest = np.max(np.abs(self.nontrivial), initial=0.0)
         is_neutral = abs(largest - 1.0) < 1e-9
         stable = "neutral" if is_neutral else "stable" if self.is_stable else "unstable"
-        modes = " ".join(str(mode) for mode in self.modes)
+        modes = " ".join(filter(None, map(str, self.modes)))
+        named = f"modes {modes}, " if modes else ""
         return (
-            f"Cycle({stable}, period {self.period:.9g}, modes {modes}, largest multiplier {largest:.6g} in "
-            f"modulus, {self.n_zero} zero)"
+            f"Cycle({stable}, period {self.period:.9g}, {named}largest multiplier {largest:.6g} in modulus, "
+            f"{self.n_zero} zero)"
         )
 
     def _with_derivatives_by(self, names: Sequence[str]) -> Shooting:
