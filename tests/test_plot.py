@@ -246,3 +246,15 @@ def test_the_legend_in_space_touches_no_axis(size: tuple[float, float], view: tu
     beside = ax.get_legend().get_window_extent(renderer)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         assert not axis.get_tightbbox(renderer).overlaps(beside), axis
+
+
+@pytest.mark.parametrize("height", [1.6, 2.4, 4.8])
+def test_letters_of_the_strip_stand_below_the_curves(height: float) -> None:
+    problem = fl.problems.get("bouncing_ball")
+    solution = problem.solve()
+    figure, ax = pyplot.subplots(figsize=(6.4, height), layout="constrained")
+    fl.plot.time_series(solution, ax=ax, states=0)
+    figure.canvas.draw()
+    lowest = ax.transData.transform((0.0, solution.y[0].min()))[1]
+    assert ax.texts
+    assert max(text.get_window_extent().y1 for text in ax.texts) < lowest - 1.0

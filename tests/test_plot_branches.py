@@ -70,6 +70,16 @@ def test_special_points_are_marked_and_named(equilibria: Branch) -> None:
     assert not any(text.get_text() == "EP" for text in ax.texts)
 
 
+def test_labels_of_a_second_branch_avoid_those_of_the_first(equilibria: Branch) -> None:
+    ax = equilibria.plot("alpha", "x[0]")
+    equilibria.plot("alpha", "x[0]", ax=ax)
+    ax.figure.draw_without_rendering()
+    assert sorted(text.get_text() for text in ax.texts) == ["BE"] * 4 + ["PSN"] * 2
+    boxes = [matplotlib.text.Text.get_window_extent(text) for text in ax.texts]
+    for k, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[k + 1 :])
+
+
 def test_labels_stand_beside_their_points_and_not_on_one_another(cycles: Branch) -> None:
     ax = cycles.plot()
     assert ax.get_ylabel() == "period"

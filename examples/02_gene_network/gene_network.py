@@ -66,7 +66,7 @@ def draw(solutions: dict[tuple[float, float], fl.Solution], path: Path) -> None:
         left.plot(*start, "o", color="0.4", markersize=3)
     left.plot(OFF, OFF, "*", color="k", markersize=11, zorder=4)
     left.set(xlim=(0.0, 12.7), ylim=(0.0, 12.7), xlabel="gene a", ylabel="gene b")
-    left.text(8.3, 7.2, "(8, 8): both thresholds", fontsize="small")
+    left.text(8.2, 7.2, "(8, 8)", fontsize="small")
     arrival = solutions[6.0, 12.0].switches[-1]
     fl.plot.hidden_dynamics(genes, arrival.t, arrival.y_before, before=arrival.mode_before, ax=right)
     right.set_title("the arrival at (8, 8), from (6, 12)", pad=24)

@@ -84,7 +84,8 @@ def main(path: Path) -> None:
         T, S = solution.sol(np.linspace(segment.t_start, segment.t_end, 400)[1:-1])
         loop.plot(T, S - ALPHA * T, color=colours[0 if segment.mode[0] > 0 else 1])
     loop.axhline(eps, color=fl.plot.theme().crossing, linestyle=":", zorder=1)
-    loop.text(0.665, eps, "mixing sets in above eps", fontsize="small", color="0.4", ha="center", va="top")
+    below = {"xytext": (0, -3), "textcoords": "offset points", "ha": "center", "va": "top"}
+    loop.annotate("mixing sets in above eps", (0.665, eps), fontsize="small", color="0.4", **below)
     loop.set(xlabel="T", ylabel="density, S - 0.8 T", title="the oscillation in (a), over the density")
     fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)

@@ -72,7 +72,9 @@ def main(path: Path) -> None:
         ax.plot(*states[..., k], ".", color="C0", markersize=3, label="states" if k == 0 else None)
         ellipse = sol.sol(t)[:, None] + derivative[..., k] @ around
         ax.plot(*ellipse, color="C1", linewidth=1.2, label="derivative" if k == 0 else None)
-        ax.annotate(f"t = {t:.2f}", sol.sol(t), xytext=(12, 14), textcoords="offset points", fontsize="small")
+        y, v = sol.sol(t)
+        beside = {"xytext": (12, 14 if v >= 0.0 else -22), "textcoords": "offset points"}
+        ax.annotate(f"t = {t:.2f}", (y, v), fontsize="small", **beside)
     ax.set_xlabel("y")
     ax.set_ylabel("v")
     ax.legend(loc="upper left")

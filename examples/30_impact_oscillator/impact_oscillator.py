@@ -148,10 +148,11 @@ def main(path: Path) -> None:
     axes[1, 0].text(1.875, 0.09, "fold")
     axes[1, 0].text(1.785, 0.03, "two attractors", ha="center")
     axes[1, 0].set_title("s = -0.5", fontsize="medium")
+    axes[1, 1].axis((2.5, 2.9, 0.0, 0.55))  # labels are placed in it
     draw_simulations(axes[1, 1])
     for speed in monitors:
         fl.plot.branches(found, "omega", speed, ax=axes[1, 1])
-    axes[1, 1].set(xlim=(2.5, 2.9), ylim=(0.0, 0.55), ylabel="speed after the impact")
+    axes[1, 1].set_ylabel("speed after the impact")
     axes[1, 1].set_title("s = 0: periods of 1, 2 and 4 forcings", fontsize="medium")
     for ax in (axes[0, 0], axes[1, 1]):
         ax.get_legend().remove()

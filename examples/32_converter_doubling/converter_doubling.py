@@ -110,15 +110,14 @@ def main(path: Path, quick: bool) -> None:
         follow=True,
     )
     where = np.repeat(sweep.E.values, sweep.row_size.values)
-    for ax in axes:
+    for ax, window in zip(axes, ((20.0, 33.0, 11.7, 12.6), (30.5, 33.0, 11.9, 12.5)), strict=True):
+        ax.axis(window)  # labels are placed in it
         ax.plot(where, sweep.v.values, ".", color=fl.plot.theme().faint, markersize=2.0, zorder=0)
         for k, branch in enumerate(branches[:3]):
             for tick in range(2**k):
                 fl.plot.branches(branch, "E", f"v at tick {tick}", ax=ax)
         ax.get_legend().remove()
         ax.set(xlabel="E [V]", ylabel="v at the ticks [V]")
-    axes[0].set(xlim=(20.0, 33.0), ylim=(11.7, 12.6))
-    axes[1].set(xlim=(30.5, 33.0), ylim=(11.9, 12.5))
     fl.plot.letters(figure.axes)
     figure.savefig(path, dpi=150)
 

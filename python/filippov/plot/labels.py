@@ -47,7 +47,7 @@ def place_labels(
     obstacles = np.concatenate([places, *crowd])
     obstacles = obstacles[np.isfinite(obstacles).all(axis=1)]
     low, high = ax.bbox.get_points() * to_points
-    boxes: list[Array] = []
+    boxes: list[Array] = _written(ax, to_points)
     for place, text, (x, y) in _merged(places, marks):
         best = None
         for distance in _DISTANCES:
@@ -76,6 +76,14 @@ def place_labels(
                 else None
             ),
         )
+
+
+def _written(ax: Any, to_points: float) -> list[Array]:
+    """Return the corners of the texts that an axes has already, without their arrows."""
+    from matplotlib.text import Text
+
+    shown = [text for text in ax.texts if text.get_visible() and text.get_text()]
+    return [Text.get_window_extent(text).get_points() * to_points for text in shown]
 
 
 def _merged(

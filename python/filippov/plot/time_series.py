@@ -41,6 +41,9 @@ _MOST_IN_ONE = 4
 _MOST_TICKS = 200
 # Heights, as shares of the axes: of the strip, where the motion slides, and of what is free around curves.
 _STRIP, _STRIP_SLIDING, _FREE = 0.02, 0.04, 0.1
+# Of the letters of the strip: their size, the gap below them as a share of the axes, and, in lines of their
+# size, the height that they take with half of a heavy curve above. In very low axes this height is limited.
+_SIZE_OF_LETTERS, _GAP, _LINES_OF_LETTERS, _MOST_FREE = "x-small", 0.005, 1.3, 0.2
 # A name stands in the strip where a piece is this much of the width per letter.
 _WIDTH_OF_A_LETTER = 0.014
 
@@ -188,7 +191,17 @@ def _draw(solution: Solution, shown: Curves, ax: Any, look: _Look) -> None:
     draw_legend(ax, handles, chosen, look.legend, mode_title(solution.surfaces) if by_mode else None)
     if len(names) == 1:
         ax.set_ylabel(label_of(names[0], look.units))
-    ax.margins(x=0, y=_FREE)
+    ax.margins(x=0, y=_free_share(ax) if look.strip and by_mode else _FREE)
+
+
+def _free_share(ax: Any) -> float:
+    """Return what is free above and below curves, so that the letters of the strip stand below them."""
+    from matplotlib.font_manager import FontProperties
+
+    letters = _LINES_OF_LETTERS * FontProperties(size=_SIZE_OF_LETTERS).get_size_in_points()
+    height = 72.0 / ax.figure.dpi * ax.bbox.height
+    share = min(_STRIP_SLIDING + _GAP + letters / height, _MOST_FREE)
+    return max(_FREE, share / (1.0 - 2.0 * share))
 
 
 def _line_style(row: int, width: float) -> Any:
@@ -260,12 +273,12 @@ def _draw_strip(ax: Any, track: Track, colours: dict[Mode, str], chosen: Theme) 
         if whole > 0.0 and abs(duration) > _WIDTH_OF_A_LETTER * (1 + len(mode)) * whole:
             ax.text(
                 start + 0.5 * duration,
-                _STRIP_SLIDING + 0.005,
+                _STRIP_SLIDING + _GAP,
                 str(mode),
                 transform=transform,
                 ha="center",
                 va="bottom",
-                fontsize="x-small",
+                fontsize=_SIZE_OF_LETTERS,
                 color=chosen.ink,
                 clip_on=True,
             )
