@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import inspect
 import json
 import re
@@ -132,6 +133,12 @@ def test_the_module_gives_the_native_itinerary_and_states(name: str, in_wasm: Pa
     np.testing.assert_allclose(page.header["end"], native.header["end"], rtol=0.01 * RTOL, atol=0.01 * ATOL)
     native, page = replies["sample"]
     np.testing.assert_allclose(page.arrays["y"], native.arrays["y"], rtol=0.01 * RTOL, atol=0.01 * ATOL)
+
+
+def test_the_module_is_small_enough_to_load() -> None:
+    if not MODULES[0].exists():
+        pytest.skip("the module of the page is missing: make app")
+    assert len(gzip.compress(MODULES[0].read_bytes())) <= 700_000
 
 
 def test_some_problems_are_arithmetic_and_some_are_not() -> None:

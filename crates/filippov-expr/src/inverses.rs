@@ -12,6 +12,7 @@
 //!
 //! The last three are looked at only where u is not negative by itself: elsewhere they end where u does, and so has the comparison to.
 
+use crate::few::sort_few;
 use crate::graph::Graph;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
@@ -57,7 +58,8 @@ fn solved_for_a_root(
         .filter_map(|place| root_at(graph, form, place, is_everywhere))
         .collect();
     // A cube asks for nothing, and leaves other roots smoother than they were.
-    terms.sort_by_key(|term| term.inverse != Inverse::Cube);
+    let is_cube = |term: &Term| term.inverse == Inverse::Cube;
+    sort_few(&mut terms, |a, b| is_cube(a) && !is_cube(b));
     for term in terms {
         if let Some(found) = solved(graph, form, &term) {
             return Some(found);

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use filippov::{BothSides, FieldError, PiecewiseSystem, Setting};
+use filippov_expr::sort_few;
 
 use crate::dimensions::Window;
 
@@ -307,7 +308,7 @@ fn with_tangencies(points: &[SheetPoint]) -> Vec<SheetPoint> {
             let zero = |a: f64, b: f64| (a * b < 0.0).then(|| a / (a - b));
             let zeros = [zero(last.minus, at.minus), zero(last.plus, at.plus)];
             let mut shares: Vec<f64> = zeros.into_iter().flatten().collect();
-            shares.sort_by(f64::total_cmp);
+            sort_few(&mut shares, |a, b| a.total_cmp(b).is_lt());
             for share in shares {
                 let between = |a: f64, b: f64| a + share * (b - a);
                 let vanishes = |zero: Option<f64>| zero == Some(share);

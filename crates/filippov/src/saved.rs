@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use filippov_expr::container::{Container, Section, Tag, Writer};
 use filippov_expr::{Backend, ExprError};
+use rustc_hash::FxHashSet;
 
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
@@ -488,10 +489,9 @@ fn check_finite(name: &'static str, value: f64) -> Result<(), Error> {
 }
 
 fn check_distinct(names: &[String]) -> Result<(), Error> {
-    let mut sorted: Vec<&String> = names.iter().collect();
-    sorted.sort_unstable();
-    match sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-        false => Ok(()),
-        true => inconsistent("two states or two parameters of one name"),
+    let mut seen = FxHashSet::default();
+    match names.iter().all(|name| seen.insert(name)) {
+        true => Ok(()),
+        false => inconsistent("two states or two parameters of one name"),
     }
 }

@@ -16,6 +16,7 @@ pub use discrete::Discrete;
 pub use edge::Edge;
 pub use pieces::{PartSign, Pieces};
 
+use crate::few::sort_few;
 use crate::graph::Graph;
 use crate::inverses;
 use crate::linear::LinearForm;
@@ -203,7 +204,7 @@ impl Regions {
                 }
             }
             // The side with fewer terms, then with the smaller constant, is nearer to a zero: it is looked at first.
-            sides.sort_by(|a, b| b.0.partial_cmp(&a.0).unwrap_or(std::cmp::Ordering::Equal));
+            sort_few(&mut sides, |a, b| a.0 > b.0);
             let sides = sides.into_iter();
             pending.extend(sides.map(|(_, value, signs, is_here)| (value, signs, is_here)));
         }

@@ -1,5 +1,7 @@
 //! Points where several continuations are Filippov solutions: which is taken, and who is told.
 
+use filippov_expr::sort_few;
+
 use super::point::{Notes, Point};
 use crate::mode::Mode;
 use crate::options::NonUnique;
@@ -62,7 +64,7 @@ fn non_unique(at: &Point, surfaces: &[usize], chosen: &Mode, mut candidates: Vec
         ),
     };
     // The chosen one first, the others in their order.
-    candidates.sort_by_key(|mode| mode != chosen);
+    sort_few(&mut candidates, |a, b| a == chosen && b != chosen);
     Warning {
         t: at.t,
         code: WarningCode::NonUnique,

@@ -57,9 +57,10 @@ pub(super) fn place_in_contact(
         let extended = |mode: &Mode| entries.iter().map(|&e| mode.with(j, e)).collect::<Vec<_>>();
         modes = modes.iter().flat_map(extended).collect();
     }
-    modes.sort_by_key(|mode| usize::MAX - mode.codimension());
+    let most = modes.iter().map(Mode::codimension).max().unwrap_or(0);
+    let of = |held: usize| modes.iter().filter(move |mode| mode.codimension() == held);
     let (mut viable, mut neutral) = (Vec::<Next>::new(), Vec::new());
-    for tried in modes {
+    for tried in (0..=most).rev().flat_map(of).cloned() {
         if at.patience.is_over() {
             return Ok(Err(Stop::Interrupted));
         }

@@ -1,5 +1,7 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
+use filippov_expr::sort_few;
+
 use super::candidate::Viable;
 use super::choice::choose;
 use super::consistency::{bends, with_those_that_jump};
@@ -252,7 +254,8 @@ fn drop_other_names(
     if viable.len() < 2 || viable.iter().all(|viable| viable.is_strict) {
         return Ok(());
     }
-    viable.sort_by_key(|viable| (viable.is_pressed, viable.next.mode != *meeting.mode));
+    let rank = |viable: &Viable| (viable.is_pressed, viable.next.mode != *meeting.mode);
+    sort_few(viable, |a, b| rank(a) < rank(b));
     let mut velocities: Vec<Vec<f64>> = Vec::with_capacity(viable.len());
     for Viable { next, .. } in viable.iter() {
         velocities.push(at.velocity_from(notes, &next.mode, next.start.as_deref())?);

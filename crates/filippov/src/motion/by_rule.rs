@@ -1,5 +1,7 @@
 //! The law of sliding on a few surfaces by another rule than the canopy.
 
+use filippov_expr::sort_few;
+
 use super::weights::{self, multipliers_of, RuleFailure};
 use super::MeetingFields;
 use crate::cube::Lap;
@@ -158,7 +160,7 @@ impl RuleLaw {
         };
         let mut found = weights::neighbours(self.rule, &fields);
         found.retain(|neighbour| neighbour.margin <= tolerance);
-        found.sort_by(|a, b| a.margin.total_cmp(&b.margin));
+        sort_few(&mut found, |a, b| a.margin.total_cmp(&b.margin).is_lt());
         found.into_iter().map(|neighbour| neighbour.mode).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! The sliding field on an intersection of surfaces.
 
+use filippov_expr::sort_few;
 use smallvec::SmallVec;
 
 use super::guard::Guards;
@@ -352,7 +353,8 @@ impl<'a> IntersectionField<'a> {
 /// The multipliers, those with the nearest times first; of several the last.
 fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
     let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
-    all.sort_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
+    let distance = |at: &&(f64, Vec<f64>)| (at.0 - t).abs();
+    sort_few(&mut all, |a, b| distance(a).total_cmp(&distance(b)).is_lt());
     all.into_iter().map(|found| &found.1[..]).collect()
 }
 

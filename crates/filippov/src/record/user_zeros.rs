@@ -1,5 +1,7 @@
 //! The zeros of the user's functions, and ticks of a section, in the step that is accepted.
 
+use filippov_expr::sort_few;
+
 use super::Recorder;
 use crate::error::FieldError;
 use crate::event::search::StepSearch;
@@ -27,7 +29,7 @@ impl Recorder<'_> {
         let mut found = search.user_zeros(&self.user_events, theta, has_ticks)?;
         if let Some(zeros) = &mut found {
             zeros.extend(self.ticks(search.stepper.interpolant(), theta, t_stop));
-            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
+            sort_few(zeros, |a, b| a.0.total_cmp(&b.0).is_lt());
         }
         Ok(found)
     }

@@ -9,6 +9,16 @@ use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
 /// Number of states where it is not fixed at compile time.
 const ANY: usize = 0;
 
+/// The number of states for which loops are unrolled. A page gets one loop for all: its module is to be small, and fields that
+/// are interpreted take longer than the sums around them.
+const fn unrolled(n_states: usize) -> usize {
+    if cfg!(target_family = "wasm") {
+        ANY
+    } else {
+        n_states
+    }
+}
+
 /// The Dormand-Prince pair of order 5(4) with seven stages, the last of which is the first of the
 /// next step.
 ///
@@ -78,7 +88,7 @@ impl Dopri5 {
         if self.stage.is_empty() {
             self.make_room(y.len());
         }
-        match y.len() {
+        match unrolled(y.len()) {
             1 => self.attempt_sized::<1, F>(field, observe, t, y, dt, scale),
             2 => self.attempt_sized::<2, F>(field, observe, t, y, dt, scale),
             3 => self.attempt_sized::<3, F>(field, observe, t, y, dt, scale),
@@ -191,7 +201,7 @@ impl Dopri5 {
     /// order 5; costs no evaluation.
     pub fn extend_order4(&mut self, y: &[f64]) -> &Interpolant {
         if self.extended.is_none() {
-            match y.len() {
+            match unrolled(y.len()) {
                 1 => self.extend_sized::<1>(y),
                 2 => self.extend_sized::<2>(y),
                 3 => self.extend_sized::<3>(y),

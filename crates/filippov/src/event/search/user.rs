@@ -4,6 +4,7 @@
 //! first, each between the zeros of those before it; then the function itself. Where its sign differs on both sides of such
 //! a zero, it has a zero there.
 
+use filippov_expr::sort_few;
 use smallvec::{smallvec, SmallVec};
 
 use super::user_piece::{value_along, Along, Outcome, Source, Start};
@@ -216,7 +217,7 @@ impl StepSearch<'_, '_> {
         };
         let changes = changes.iter().map(|change| (change.at, part, change.after));
         cuts.changes.extend(changes);
-        cuts.changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_few(&mut cuts.changes, |a, b| a.0.total_cmp(&b.0).is_lt());
         Ok(true)
     }
 
