@@ -71,6 +71,10 @@ DARK = {
 }
 # A picture that code draws: the page's own, or the one of an example.
 _PICTURE = re.compile(r"!\[(?P<text>[^]]*)\]\((?P<name>[^)/]*)\.png\)")
+_TABLE, _CODE = re.compile(r"<table>.*?</table>", re.DOTALL), re.compile(r"(?<=<code>)[^<]*(?=</code>)")
+_POWER = re.compile(r"\d+(?:\.\d+)?e-\d+")
+# Where code may wrap: after a sign that is followed by a word or by a text.
+_SIGN = re.compile(r"(?<=[_.,(=\[/])(?=[^\W\d]|&quot;|[\"'])")
 _BLANK = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -128,6 +132,16 @@ def on_page_markdown(markdown: str, page: Any, files: Any, **_: Any) -> str:
         return f"[{match['text']}]({way}{'#' + anchor if anchor else ''})"
 
     return _LINK.sub(renewed, markdown)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Let tables wrap where they are read on: code after its signs, numbers not at all."""
+
+    def renewed(table: re.Match[str]) -> str:
+        text = _CODE.sub(lambda code: _SIGN.sub("<wbr>", code[0]), table[0])
+        return _POWER.sub(r'<span class="number">\g<0></span>', text)
+
+    return _TABLE.sub(renewed, html)
 
 
 def _page_of(path: Path) -> str | None:
