@@ -135,6 +135,26 @@ def test_the_module_gives_the_native_itinerary_and_states(name: str, in_wasm: Pa
     np.testing.assert_allclose(page.arrays["y"], native.arrays["y"], rtol=0.01 * RTOL, atol=0.01 * ATOL)
 
 
+@pytest.mark.parametrize(
+    ("page", "words"),
+    [
+        ({"y0": [1, 2, 3]}, "PAGE.y0: 2 numbers are needed, one for each of y, v; there are 3"),
+        ({"y0": [1]}, "PAGE.y0: 2 numbers"),
+        ({"y0": ["a", 1]}, "PAGE.y0: a list of finite numbers"),
+        ({"t_span": [5]}, "PAGE.t_span: 2 numbers"),
+        ({"t_span": [5, 5]}, "PAGE.t_span: two different times"),
+        ({"axes": [0, 7]}, "PAGE.axes: two different states"),
+        ({"ranges": {"y": 3}}, "PAGE.ranges.y: a list"),
+        ({"rtol": "x"}, "PAGE.rtol: a finite number"),
+        ({"text": 3}, "PAGE.text: a text"),
+    ],
+)
+def test_a_page_of_another_model_is_refused_by_name(page: dict[str, Any], words: str) -> None:
+    model = pack_page(fl.System(_springs, n=2, states=["y", "v"]).to_bytes(), json.dumps(page))
+    with pytest.raises(ValueError, match=re.escape(words)):
+        PageModel(model)
+
+
 def test_the_module_is_small_enough_to_load() -> None:
     if not MODULES[0].exists():
         pytest.skip("the module of the page is missing: make app")

@@ -138,6 +138,13 @@ REFUSED = {
     "def f(t, x):\n    return x[0] == 1": (2, 20, "=="),
     "def f(t, x):\n    return -w": (2, 13, "w"),
     "def f(t, x):\n    y, v = x\n    return y": (1, 5, "1 values"),
+    "import numpy as np\ny0 = [1, 2, 3]\ndef f(t, x):\n    y, v = x\n    return v, -y": (
+        2,
+        1,
+        "y0 needs 2 numbers",
+    ),
+    "y0 = 1.0\ndef f(t, x):\n    y, v = x\n    return v, -y": (1, 1, "y0 needs 2 numbers"),
+    "t_span = (2, 2)\ndef f(t, x):\n    y, v = x\n    return v, -y": (1, 1, "two different times"),
     "def f(t, x)\n    return x": (1, 12, ""),
     "x = open('file')\ndef f(t, x):\n    return x": (1, 5, "function open"),
     "import numpy as np": (1, 1, "function"),

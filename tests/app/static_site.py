@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import shutil
 import threading
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -42,8 +44,14 @@ def what_is_missing() -> str:
     return "" if hasattr(_core, "pack_page") else "the extension cannot write models for the page"
 
 
-def model_bytes(name: str) -> bytes:
-    """Return a reference problem as the page reads it."""
+def packed(part: bytes) -> str:
+    """Return a part of a link."""
+    press = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return base64.urlsafe_b64encode(press.compress(part) + press.flush()).decode().rstrip("=")
+
+
+def model_bytes(name: str, **own: Any) -> bytes:
+    """Return a reference problem as the page reads it, with fields of its page that are other ones."""
     problem = fl.problems.get(name)
     page = {
         "title": problem.note,
@@ -56,6 +64,7 @@ def model_bytes(name: str) -> bytes:
         "axes": None,
         "text": None,
         "reference": name,
+        **own,
     }
     return bytes(_core.pack_page(problem.system().to_bytes(), json.dumps(page)))
 

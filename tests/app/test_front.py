@@ -20,7 +20,7 @@ import pytest
 from filippov.app import make_page, write_script
 
 from app.conftest import front, settle, wait_until
-from app.static_site import STATIC, model_bytes
+from app.static_site import STATIC, model_bytes, packed
 
 AXE = Path(__file__).resolve().parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
 
@@ -237,6 +237,11 @@ def test_a_link_brings_back_the_model_and_the_view(open_page: Any, by_name: bool
         ("#m=AwA", "not a file of filippov"),
         ("#p=no_such_problem", "no model"),
         ("#p=../../secret", "no model"),
+        (
+            "#p=dry_friction&s=" + packed(b'{"y0": [1, 2, 3]}'),
+            "a start needs 2 numbers, for y, v; there are 3",
+        ),
+        ("#m=" + packed(model_bytes("dry_friction", y0=[1, 2, 3])), "PAGE.y0: 2 numbers are needed"),
     ],
 )
 def test_a_link_that_is_no_good_is_answered_in_words(open_page: Any, fragment: str, words: str) -> None:

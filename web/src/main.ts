@@ -74,7 +74,7 @@ async function fromAddress(element: HTMLElement & { front?: Front | null }, home
   const openProblem = (name: string) => goTo(name === "" ? home : `p=${encodeURIComponent(name)}`);
   /** A model that was read goes into the address: a reload shows it again, and the way back leads to what was before. */
   const openModel = (model: Uint8Array) => {
-    const view = element.front ? { ...element.front.ownStart, place: "model" } : null;
+    const view = element.front ? { before: element.front.ownStart, place: "model" } : null;
     void writeFragment({ model }, view).then(goTo);
   };
   const common = { problems, address: location.href.split("#")[0], openProblem, openModel, reader: fetchReader };

@@ -2,6 +2,7 @@
 
 import type { Description, State } from "./model.ts";
 import { hasReciprocal, initialState, PLACES } from "./model.ts";
+import { count, showName } from "./numbers.ts";
 
 /** What the fragment of an address holds. */
 export interface Fragment {
@@ -118,9 +119,10 @@ export function toState(model: Description, view: unknown): State {
       if (isNumber(value)) state.params[name] = value;
     }
   }
-  if (isNumbers(given.y0, model.n)) state.y0 = [...given.y0];
-  if (isNumbers(given.t_span, 2) && given.t_span[0] !== given.t_span[1])
-    state.t_span = [given.t_span[0], given.t_span[1]];
+  const { before } = given; // start and time of the model that was there before: a model with other states has its own
+  const { y0, t_span } = isRecord(before) ? { ...before, y0: ofLength(before.y0, model.n) } : given;
+  if (y0 !== undefined) state.y0 = toStart(model, y0);
+  if (isNumbers(t_span, 2) && t_span[0] !== t_span[1]) state.t_span = [t_span[0], t_span[1]];
   for (const name of ["rtol", "atol"] as const) {
     const value = given[name];
     if (isNumber(value) && value > 0) state[name] = value;
@@ -136,12 +138,7 @@ export function toState(model: Description, view: unknown): State {
   if (isNumbers(given.box, 4) && given.box[0] < given.box[1] && given.box[2] < given.box[3]) {
     state.box = [given.box[0], given.box[1], given.box[2], given.box[3]];
   }
-  if (Array.isArray(given.kept)) {
-    state.kept = given.kept
-      .filter((start) => isNumbers(start, model.n))
-      .slice(0, MOST_KEPT)
-      .map((start) => [...start]);
-  }
+  if (Array.isArray(given.kept)) state.kept = given.kept.slice(0, MOST_KEPT).map((start) => toStart(model, start));
   const place = PLACES.find((name) => name === given.place);
   if (place) state.place = place;
   if (typeof given.parameter === "string" && given.parameter in state.params) state.parameter = given.parameter;
@@ -162,6 +159,18 @@ export function toState(model: Description, view: unknown): State {
   state.reciprocal = given.reciprocal === true && state.range !== null && hasReciprocal(state.range);
   state.section = toSection(model, given.section) ?? state.section;
   return state;
+}
+
+/** A start that a link carries: a link with that of another model is refused. */
+function toStart(model: Description, given: unknown): number[] {
+  if (isNumbers(given, model.n)) return [...given];
+  const found = Array.isArray(given) ? `there ${given.length === 1 ? "is" : "are"} ${given.length}` : "there is no list";
+  const names = model.states.map(showName).join(", ");
+  throw new Error(`The link is damaged: a start needs ${count(model.n, "number")}, for ${names}; ${found}.`);
+}
+
+function ofLength(value: unknown, length: number): unknown {
+  return Array.isArray(value) && value.length === length ? value : undefined;
 }
 
 function toSection(model: Description, given: unknown): State["section"] {

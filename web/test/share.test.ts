@@ -57,13 +57,12 @@ test("of a foreign view only what fits the model is taken", () => {
   const model = friction();
   const state = toState(model, {
     params: { F: "1", omega: 3, other: 7, __proto__: { F: 9 } },
-    y0: [1, 2, 3],
     t_span: [5, 5],
     rtol: -1,
     axes: [0, 0],
     place: "elsewhere",
     section: { by: "surface", surface: "no such" },
-    kept: [[1, 2], [1], "x"],
+    kept: [[1, 2]],
     coordinate: 5,
     parameter: "omega",
     range: [0, 2],
@@ -73,4 +72,17 @@ test("of a foreign view only what fits the model is taken", () => {
   const own = { params: { F: 0.4, omega: 3 }, kept: [[1, 2]], parameter: "omega", range: [0, 2] };
   assert.deepEqual(state, { ...plain, ...own });
   assert.ok(toState(model, { parameter: "omega", range: [3, 0.1], reciprocal: true }).reciprocal);
+});
+
+test("a start of another length than the model is refused, and that of the model before is left out", () => {
+  const model = friction();
+  const y0 = [...initialState(model).y0];
+  for (const view of [{ y0: [1, 2, 3] }, { y0: [1] }, { kept: [[1, 2], [1]] }]) {
+    assert.throws(() => toState(model, view), /a start needs 2 numbers, for y, v; there (is|are) [13]\./);
+  }
+  assert.throws(() => toState(model, { y0: "abc" }), /there is no list/);
+  assert.throws(() => toState(model, { y0: [1, null] }), /a start needs 2 numbers/);
+  assert.deepEqual(toState(model, { before: { y0: [1, 2, 3], t_span: [0, 7] } }).y0, y0);
+  assert.deepEqual(toState(model, { before: { y0: [1, 2, 3], t_span: [0, 7] } }).t_span, [0, 7]);
+  assert.deepEqual(toState(model, { before: { y0: [5, 6] } }).y0, [5, 6]);
 });

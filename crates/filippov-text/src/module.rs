@@ -7,6 +7,7 @@ use filippov::SavedSystem;
 use filippov_expr::Names;
 use ruff_python_ast::visitor::{walk_expr, walk_stmt, Visitor};
 use ruff_python_ast::{Decorator, Expr, Stmt, StmtFunctionDef};
+use ruff_text_size::Ranged;
 
 use crate::calls::Arguments;
 use crate::model::{traced, SystemText};
@@ -61,6 +62,7 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
     reader.is_outside = true;
     let mut functions: Vec<String> = Vec::new();
     let mut systems: Vec<(String, Rc<SystemText>)> = Vec::new();
+    let mut places = BTreeMap::new();
     for statement in body {
         match statement {
             Stmt::Import(_) | Stmt::ImportFrom(_) => {}
@@ -77,6 +79,7 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
                 reader.run(std::slice::from_ref(statement))?;
                 if let [Expr::Name(name)] = &assign.targets[..] {
                     let name = name.id.to_string();
+                    places.insert(name.clone(), assign.range());
                     match scope.get(&name) {
                         Some(Value::System(system)) => systems.push((name, system)),
                         Some(Value::Function(_)) => functions.push(name),
@@ -129,6 +132,21 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
             )
         }
     };
+    if let Some(place) = places.get("y0") {
+        let given = y0.as_ref().map(Vec::len);
+        if given != Some(n) {
+            let found = given.map_or("no list of numbers".to_owned(), |given| given.to_string());
+            return refuse(
+                place,
+                format!("y0 needs {n} numbers, one for each state; there are {found}"),
+            );
+        }
+    }
+    if let Some(place) = places.get("t_span") {
+        if !matches!(t_span.as_deref(), Some([from, to]) if from != to) {
+            return refuse(place, "t_span needs two different times");
+        }
+    }
     Ok(TextModel {
         name,
         system: traced(&system, &imported, n, states)?,

@@ -11,12 +11,10 @@ pub fn reply(source: &str) -> Vec<u8> {
     let header = match read(source) {
         Ok(found) => {
             let n = found.system.definition.field.len();
-            let y0 = found.y0.filter(|y0| y0.len() == n);
-            let t_span = found.t_span.filter(|span| span.len() == 2);
             let page = json!({
                 "title": found.name,
-                "y0": y0.unwrap_or_else(|| vec![1.0; n]),
-                "t_span": t_span.unwrap_or_else(|| vec![0.0, 20.0]),
+                "y0": found.y0.unwrap_or_else(|| vec![1.0; n]),
+                "t_span": found.t_span.unwrap_or_else(|| vec![0.0, 20.0]),
                 "text": source,
             });
             match pack(&found.system.to_bytes(), &page.to_string()) {

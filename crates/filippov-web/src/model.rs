@@ -9,6 +9,8 @@ use filippov_expr::Backend;
 use serde_json::{Map, Value};
 
 use crate::refusal::Refusal;
+use crate::request::Request;
+use crate::run_request::start_of;
 
 /// The section that a page adds to the bytes of a system.
 const PAGE: Tag = Tag(*b"PAGE");
@@ -96,15 +98,17 @@ impl Model {
     /// The model of a source.
     ///
     /// # Errors
-    /// If the description has no states.
+    /// If the description has no states, or its page is that of another model.
     pub fn new(description: Description, source: Box<dyn Source>) -> Result<Self, Refusal> {
         if description.states.is_empty() {
             return Err(Refusal::model("a model needs a state"));
         }
-        Ok(Model {
+        let model = Model {
             description,
             source,
-        })
+        };
+        check_page(&model)?;
+        Ok(model)
     }
 
     /// The model in the bytes of a saved system, with the section of a page or without one.
@@ -195,6 +199,35 @@ pub fn pack(system: &[u8], page: &str) -> Result<Vec<u8>, Refusal> {
 /// As [`SavedSystem::from_bytes`].
 pub fn unpack(model: &[u8]) -> Result<(SavedSystem, Option<String>), filippov::Error> {
     SavedSystem::from_bytes_with(model, PAGE)
+}
+
+/// A host draws what the section of a page says before it asks anything: each field has to be one of this model.
+fn check_page(model: &Model) -> Result<(), Refusal> {
+    let page = Request::page(model);
+    start_of(model, &page)?;
+    if let Some([from, to]) = page.exactly::<2>("t_span")? {
+        if from == to {
+            return Err(page.wrong("t_span", "two different times are needed"));
+        }
+    }
+    if let Some(axes) = page.exactly::<2>("axes")? {
+        let is_state = |axis: f64| (0..model.n()).any(|i| i as f64 == axis);
+        if !axes.into_iter().all(is_state) || axes[0] == axes[1] {
+            let last = model.n() - 1;
+            let requirement = format!("two different states are needed, from 0 to {last}");
+            return Err(page.wrong("axes", &requirement));
+        }
+    }
+    if let Some(ranges) = page.object("ranges")? {
+        for (name, _) in ranges.entries() {
+            ranges.exactly::<2>(name)?;
+        }
+    }
+    page.number("rtol")?;
+    for name in ["title", "method", "text", "reference"] {
+        page.text(name)?;
+    }
+    Ok(())
 }
 
 fn page_of(text: &str) -> Result<Map<String, Value>, Refusal> {

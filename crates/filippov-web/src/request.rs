@@ -52,6 +52,7 @@ impl<'a> Request<'a> {
             fields,
             prefix: match name {
                 "section" => "section.",
+                "ranges" => "PAGE.ranges.",
                 "params" => "params.",
                 _ => "",
             },

@@ -25,15 +25,11 @@ impl RunRequest {
     /// Reads a request; what it lacks has the values of the page.
     pub fn read(model: &Model, request: &Request, keep: Keep) -> Result<Self, Refusal> {
         let page = Request::page(model);
-        let y0 = match request.numbers("y0")? {
+        let y0 = match start_of(model, request)? {
             Some(y0) => Some(y0),
-            None => page.numbers("y0")?,
+            None => start_of(model, &page)?,
         };
         let y0 = request.needed("y0", y0)?;
-        if y0.len() != model.n() {
-            let requirement = format!("{} numbers are needed, one per state", model.n());
-            return Err(request.wrong("y0", &requirement));
-        }
         let span = match request.exactly::<2>("t_span")? {
             Some(span) => Some(span),
             None => page.exactly::<2>("t_span")?,
@@ -45,6 +41,21 @@ impl RunRequest {
             params: params_of(model, request)?,
             options: options_of(&page, request, keep)?,
         })
+    }
+}
+
+/// The start in a request or in the section of a page: a number for each state.
+pub fn start_of(model: &Model, request: &Request) -> Result<Option<Vec<f64>>, Refusal> {
+    let found = request.numbers("y0")?;
+    match &found {
+        Some(y0) if y0.len() != model.n() => {
+            let names = model.description.states.join(", ");
+            let (given, n) = (y0.len(), model.n());
+            let requirement =
+                format!("{n} numbers are needed, one for each of {names}; there are {given}");
+            Err(request.wrong("y0", &requirement))
+        }
+        _ => Ok(found),
     }
 }
 
