@@ -192,12 +192,34 @@ def test_equilibria_where_two_surfaces_meet_are_those_of_the_package(fun: Any) -
     expected = fl.equilibria(system, [(-3.1, 3), (-3, 3.2)])
     assert any(point.codimension == 2 for point in expected)
     assert len(found) == len(expected)
-    assert "two surfaces meet" in header["searched"]
+    assert "where surfaces meet" in header["searched"]
     for point in expected:
         [same] = [other for other in found if np.allclose(other["y"], point.y, atol=1e-8)]
         names = [name for name, entry in zip(system.surfaces, point.mode, strict=True) if entry == 0]
         assert sorted(same["surfaces"]) == sorted(names)
         assert same["stable"] in (None, point.is_stable)
+
+
+def _three_relays(t: float, x: Any) -> Any:
+    z, y, v = x
+    a, b, c = np.sign(z - 0.5), np.sign(y), np.sign(v + 0.25 * y)
+    return [-a + 0.2 * b + 0.3, -b + 0.1 * v - 0.2, -c - 0.3 * a + 0.1]
+
+
+@pytest.mark.parametrize("axes", [(0, 1), (1, 2)])
+def test_equilibria_where_three_surfaces_meet_are_those_of_the_package(axes: tuple[int, int]) -> None:
+    system = fl.System(_three_relays, n=3)
+    model = pack_page(system.to_bytes(), json.dumps({"y0": [1.0, 1.0, 1.0], "t_span": [0, 1]}))
+    request = {"kind": "portrait", "axes": axes, "box": [-1.1, 1, -1, 1.2]}
+    header = Reply.of(answer_page(PageModel(model), json.dumps(request).encode())).header
+    found = [point for point in header["equilibria"] if point["admissible"]]
+    [point] = [p for p in fl.equilibria(system, [(-1.1, 1.2)] * 3) if p.codimension == 3]
+    [same] = [other for other in found if len(other["surfaces"]) == 3]
+    np.testing.assert_allclose(same["y"], point.y, atol=1e-8)
+    assert same["stable"] is point.is_stable is True
+    # The end of a run agrees.
+    end = fl.solve_ivp(system, (0, 20), [1.0, 1.0, 1.0]).y[:, -1]
+    np.testing.assert_allclose(end, point.y, atol=1e-8)
 
 
 def test_the_ends_of_basins_come_in_parts() -> None:

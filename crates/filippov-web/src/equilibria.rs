@@ -26,6 +26,11 @@ const STARTS_ALONG: usize = 9;
 const MOST_ITERATIONS: usize = 40;
 /// Ends of parts of two surfaces that are nearer than this share of the window show where these meet.
 const NEAR_ENDS: f64 = 0.05;
+/// So many states are kept near which the same surfaces meet, and so many for each number of surfaces.
+const MOST_OF_A_SET: usize = STARTS_ALONG;
+const MOST_MEETINGS: usize = 100;
+/// Beside m surfaces there are 2^m fields.
+const MOST_SURFACES: usize = 6;
 /// Equilibria nearer than this share of the window are one.
 const SAME: f64 = 1e-6;
 /// The last correction, relative to the size of the unknowns.
@@ -35,7 +40,7 @@ const UNDECIDED: f64 = 1e-6;
 /// Differences of the cube root of the rounding unit: the best for central ones.
 const STEP: f64 = 6e-6;
 
-/// The equilibria in the window: those of the regions seen there, those on one surface each, and those where two surfaces meet.
+/// The equilibria in the window: those of the regions seen there, those on one surface each, and those where surfaces meet.
 /// A point on the border of its region is not among them: it is the end of sliding, or of sticking.
 pub fn equilibria(
     plane: &Plane,
@@ -99,9 +104,15 @@ pub fn equilibria(
             found.into_iter().for_each(&mut add);
         }
     }
-    for (surfaces, x) in meetings(plane, parts, n_visible)? {
-        let found = pseudo_equilibrium(plane, &surfaces, x, &[0.0; 2], n_visible)?;
-        found.into_iter().for_each(&mut add);
+    let mut met = pairs(plane, parts, n_visible)?;
+    for _ in 2..=plane.system.n_states().min(n_visible).min(MOST_SURFACES) {
+        let more = with_one_more(plane, &met, n_visible)?;
+        for (surfaces, x) in met {
+            let multipliers = vec![0.0; surfaces.len()];
+            let found = pseudo_equilibrium(plane, &surfaces, x, &multipliers, n_visible)?;
+            found.into_iter().for_each(&mut add);
+        }
+        met = more;
     }
     Ok(found)
 }
@@ -137,16 +148,12 @@ fn pseudo_equilibrium(
     }))
 }
 
-/// Two surfaces, and a state near which they meet.
+/// Surfaces, and a state near which they meet.
 type Meeting = (Vec<usize>, Vec<f64>);
 
 /// Where two surfaces meet in the window, as far as the ends of their pieces show it; in more than two states also starts along
 /// each surface, for the other states are not those of the window there.
-fn meetings(
-    plane: &Plane,
-    parts: &[SheetPart],
-    n_visible: usize,
-) -> Result<Vec<Meeting>, FieldError> {
+fn pairs(plane: &Plane, parts: &[SheetPart], n_visible: usize) -> Result<Vec<Meeting>, FieldError> {
     let mut found = Vec::new();
     for part in parts {
         let stride = part.points.len().div_ceil(STARTS_ALONG);
@@ -155,12 +162,16 @@ fn meetings(
             let x = plane.window.state(point.point);
             let signs = plane.signs(&x)?;
             let is_start = x.len() > 2 && index % stride == 0;
-            for other in part.surface + 1..n_visible {
+            let is_unseen = |j: usize| parts.iter().all(|part| part.surface != j);
+            let others =
+                (0..n_visible).filter(|&j| j > part.surface || j < part.surface && is_unseen(j));
+            for other in others {
                 let crosses = before
                     .as_ref()
                     .is_some_and(|before| before[other] != signs[other]);
                 if crosses || is_start {
-                    found.push((vec![part.surface, other], x.clone()));
+                    let pair = vec![part.surface.min(other), part.surface.max(other)];
+                    found.push((pair, x.clone()));
                 }
             }
             before = Some(signs);
@@ -188,6 +199,98 @@ fn meetings(
         }
     }
     Ok(found)
+}
+
+/// Where one surface more passes than those that are known to meet, seen through the window.
+fn with_one_more(
+    plane: &Plane,
+    known: &[Meeting],
+    n_visible: usize,
+) -> Result<Vec<Meeting>, FieldError> {
+    let mut found: Vec<Meeting> = Vec::new();
+    let is_near = |a: &[f64], b: &[f64]| {
+        let mut pairs = a.iter().zip(b);
+        pairs.all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()))
+    };
+    for (surfaces, x) in known {
+        if surfaces.len() == plane.system.n_states() {
+            continue;
+        }
+        for other in (0..n_visible).filter(|j| !surfaces.contains(j)) {
+            let mut set = surfaces.clone();
+            set.push(other);
+            set.sort_unstable();
+            let of_set = found.iter().filter(|(known, _)| *known == set);
+            if found.len() == MOST_MEETINGS || of_set.count() == MOST_OF_A_SET {
+                continue;
+            }
+            let Some(x) = onto(plane, &set, x.clone())? else {
+                continue;
+            };
+            let is_known = |(known, at): &Meeting| *known == set && is_near(at, &x);
+            if plane.window.contains(plane.window.point(&x)) && !found.iter().any(is_known) {
+                found.push((set, x));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// The state on all of these surfaces that is reached from here along their gradients; none if they do not meet.
+fn onto(
+    plane: &Plane,
+    surfaces: &[usize],
+    mut x: Vec<f64>,
+) -> Result<Option<Vec<f64>>, FieldError> {
+    let signs = plane.signs(&x)?;
+    let values = |x: &[f64]| -> Result<Vec<f64>, FieldError> {
+        let mut h = vec![0.0; signs.len()];
+        let setting = Setting::new(&signs, plane.q);
+        plane.system.surfaces(&setting.at(plane.t, x), &mut h)?;
+        Ok(surfaces.iter().map(|&j| h[j]).collect())
+    };
+    for _ in 0..MOST_ITERATIONS {
+        let h = values(&x)?;
+        let gradients = differences(&x, values)?;
+        let gram = Matrix::of(surfaces.len(), |i, j| {
+            gradients.iter().map(|along| along[i] * along[j]).sum()
+        });
+        let Some(shares) = gram.solve(&h) else {
+            return Ok(None);
+        };
+        let mut is_there = true;
+        for (value, along) in x.iter_mut().zip(&gradients) {
+            let change: f64 = along.iter().zip(&shares[..]).map(|(a, b)| a * b).sum();
+            *value -= change;
+            is_there &= change.abs() <= CONVERGED * (1.0 + value.abs());
+        }
+        if is_there || !x.iter().all(|value| value.is_finite()) {
+            return Ok(is_there.then_some(x));
+        }
+    }
+    Ok(None)
+}
+
+/// The derivatives of a function by each variable, as central differences.
+fn differences(
+    at: &[f64],
+    function: impl Fn(&[f64]) -> Result<Vec<f64>, FieldError>,
+) -> Result<Vec<Vec<f64>>, FieldError> {
+    let mut moved = at.to_vec();
+    let mut columns = Vec::with_capacity(at.len());
+    for (k, &value) in at.iter().enumerate() {
+        let step = STEP * (1.0 + value.abs());
+        let (up, down) = (value + step, value - step);
+        moved[k] = up;
+        let above = function(&moved)?;
+        moved[k] = down;
+        let below = function(&moved)?;
+        moved[k] = value;
+        let both = above.iter().zip(&below);
+        let column = both.map(|(above, below)| (above - below) / (up - down));
+        columns.push(column.collect());
+    }
+    Ok(columns)
 }
 
 /// The equations of an equilibrium in a region, or on surfaces with their multipliers as the last unknowns.
@@ -228,22 +331,8 @@ impl Balance<'_> {
     }
 
     fn jacobian(&self, unknowns: &[f64]) -> Result<Matrix, FieldError> {
-        let n = unknowns.len();
-        let mut columns = Vec::with_capacity(n);
-        let mut moved = unknowns.to_vec();
-        for (k, &value) in unknowns.iter().enumerate() {
-            let step = STEP * (1.0 + value.abs());
-            let (up, down) = (value + step, value - step);
-            moved[k] = up;
-            let above = self.residual(&moved)?;
-            moved[k] = down;
-            let below = self.residual(&moved)?;
-            moved[k] = value;
-            let both = above.iter().zip(&below);
-            let column = both.map(|(above, below)| (above - below) / (up - down));
-            columns.push(column.collect::<Vec<f64>>());
-        }
-        Ok(Matrix::of(n, |i, k| columns[k][i]))
+        let columns = differences(unknowns, |moved| self.residual(moved))?;
+        Ok(Matrix::of(unknowns.len(), |i, k| columns[k][i]))
     }
 
     /// The solution that Newton's method reaches from here, and the derivative there; none if it reaches none, or one that is
@@ -321,24 +410,27 @@ fn sliding_stability(n: usize, jacobian: &Matrix) -> Option<bool> {
     stability(&reduced)
 }
 
-/// The states, one or two, in which the gradients of as many surfaces have the largest determinant.
+/// As many states as there are surfaces, in which their gradients are independent: the pivots of an elimination.
 fn steepest(n: usize, m: usize, entry: &dyn Fn(usize, usize) -> f64) -> Vec<usize> {
-    let size = |columns: &[usize]| match columns {
-        [a] => entry(n, *a).abs(),
-        [a, b] => (entry(n, *a) * entry(n + 1, *b) - entry(n, *b) * entry(n + 1, *a)).abs(),
-        _ => 0.0,
-    };
-    let single = (0..n).map(|a| vec![a]);
-    let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| vec![a, b]));
-    let candidates: Vec<Vec<usize>> = match m {
-        1 => single.collect(),
-        _ => pairs.collect(),
-    };
-    let larger = |best: Vec<usize>, other: Vec<usize>| match size(&other) > size(&best) {
-        true => other,
-        false => best,
-    };
-    candidates.into_iter().reduce(larger).unwrap_or_default()
+    let gradient = |j: usize| (0..n).map(|i| entry(n + j, i)).collect();
+    let mut rows: Vec<Vec<f64>> = (0..m).map(gradient).collect();
+    let mut columns = Vec::with_capacity(m);
+    while let Some(row) = rows.pop() {
+        let larger = |best: usize, i: usize| match row[i].abs() > row[best].abs() {
+            true => i,
+            false => best,
+        };
+        let pivot = (0..n).reduce(larger).unwrap_or(0);
+        columns.push(pivot);
+        for other in &mut rows {
+            let factor = other[pivot] / row[pivot];
+            for (value, own) in other.iter_mut().zip(&row) {
+                *value -= factor * own;
+            }
+            other[pivot] = 0.0;
+        }
+    }
+    columns
 }
 
 /// Do all eigenvalues have negative real parts? `None` if one is too near to the imaginary axis.

@@ -18,7 +18,7 @@ const MOST_ARROWS: u64 = 200;
 
 /// What is looked for, in words.
 const SEARCHED: &str = "Equilibria were looked for by Newton's method from many starts: in the regions seen here, on each surface, \
-    and where two surfaces meet. There may be others.";
+    and where surfaces meet. There may be others.";
 
 pub fn portrait(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     if model.n() < 2 {
