@@ -118,6 +118,7 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/diagram.py
 	$(PY) benchmarks/tables.py
 	$(PY) benchmarks/derivatives.py
+	$(PY) benchmarks/events.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 	$(PY) examples/01_stick_slip/stick_slip.py

@@ -199,3 +199,15 @@ def test_a_quantity_reads_a_table_whose_comparison_was_split() -> None:
     np.testing.assert_allclose(np.interp(sol.sol(found)[0], PLACES, levels), 0.5, rtol=0, atol=1e-9)
     ends = system.ensemble((0, 5), [[0.0], [1.0]])
     np.testing.assert_allclose(ends.outputs["profile"], np.interp(ends.y[:, 0], PLACES, levels), atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["Taylor", "DOPRI5", "Rodas5P"])
+def test_signs_that_change_together_do_so_at_one_time(method: str) -> None:
+    """The remainder of y over 1/2 is below 1/2: what is asked of it jumps nowhere, at its jumps neither."""
+
+    def event(t: float, x: Any) -> Any:
+        return 0.25 * np.floor(2.0 * ((np.sin(2 * x[0]) % 0.5) // 0.5)) - 0.3
+
+    for start in np.linspace(0.0, 1.0, 12):
+        sol = fl.solve_ivp(lambda t, x: [1.0], (0, 4), [start], method=method, events=event)
+        assert sol.t_events[0].tolist() == []

@@ -761,3 +761,23 @@ def test_threads() -> None:
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(solve, range(60)))
+
+
+def test_a_repeated_call_with_an_event_finds_what_a_first_one_does() -> None:
+    level = [0.3]
+    event = lambda t, x: x[0] - level[0]  # noqa: E731
+    oscillator = lambda t, x: [x[1], -x[0]]  # noqa: E731
+    system = fl.System(oscillator, n=2)
+    for level[0] in (0.3, 0.5):
+        for start in ([1.0, 0.0], [0.0, 1.0]):
+            for direction in ("up", "both"):
+                found = fl.Event(event, direction=direction, terminal=3)
+                runs = [system.solve((0.0, 10.0), start, events=found, wrt="y0") for _ in range(2)]
+                first = fl.solve_ivp(oscillator, (0.0, 10.0), start, events=found, wrt="y0")
+                for sol in runs:
+                    assert sol.status == first.status
+                    assert sol.t_events[0].tolist() == first.t_events[0].tolist()
+                    assert sol.dt_events[0].tolist() == first.dt_events[0].tolist()
+    assert system._calls  # the second of two equal calls was one that is kept
+    assert system.solve((0.0, 10.0), [1.0, 0.0], events=[]).t_events == []
+    assert system.solve((0.0, 10.0), [1.0, 0.0], events=None).t_events is None

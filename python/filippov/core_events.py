@@ -18,7 +18,7 @@ from filippov.trace.fingerprint import fingerprint
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["CoreEvent", "core_events", "sampled"]
+__all__ = ["CoreEvent", "core_events", "sampled", "traced_events"]
 
 Array = npt.NDArray[np.float64]
 CoreEvent = tuple[Callable[[float, Array], float] | TracedEvent, float, int, str]
@@ -45,13 +45,7 @@ def core_events(
     functions = [bind_function(spec.g, args, values) for spec in specs]
     for index, (spec, g) in enumerate(zip(specs, functions, strict=True)):
         check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-    found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
-    with_own_laws = [spec.g for spec, traced in zip(specs, found, strict=True) if traced == OWN_LAW]
-    if with_own_laws and system is not None:
-        extended = system.prepare_with_laws_of(with_own_laws, prepared, t0, y0, values)
-        if extended is not None and extended.trace is not None:
-            prepared = extended
-            found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
+    prepared, found = traced_events(specs, system, prepared, t0, y0, args, values)
     events: list[CoreEvent] = []
     for index, (spec, g, traced) in enumerate(zip(specs, functions, found, strict=True)):
         if isinstance(traced, TracedEvent):
@@ -60,6 +54,25 @@ def core_events(
         warn_user([sampled(f"events: entry {index} ({spec.name})", traced)])
         events.append((g, spec.direction, spec.terminal, spec.name))
     return prepared, events
+
+
+def traced_events(
+    specs: list[EventSpec],
+    system: System | None,
+    prepared: Prepared,
+    t0: float,
+    y0: Array,
+    args: tuple[Any, ...],
+    values: dict[str, float],
+) -> tuple[Prepared, list[TracedEvent | str]]:
+    """Return the system of the run, and for each event its trace, or why there is none; see `core_events`."""
+    found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
+    with_own_laws = [spec.g for spec, traced in zip(specs, found, strict=True) if traced == OWN_LAW]
+    if with_own_laws and system is not None:
+        extended = system.prepare_with_laws_of(with_own_laws, prepared, t0, y0, values)
+        if extended is not None and extended.trace is not None:
+            return extended, [_traced(extended, spec, t0, y0, args, values) for spec in specs]
+    return prepared, found
 
 
 def sampled(what: str, why: str) -> str:
@@ -87,7 +100,7 @@ def _traced(
 
     def key() -> Hashable | None:
         read = fingerprint(spec.g, args)
-        return None if read is None else (t0, y0.tobytes(), tuple(values.items()), read)
+        return None if read is None else (tuple(values.items()), read)
 
     before = key()
     known = prepared.trace.events.find(before) if before is not None else None

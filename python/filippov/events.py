@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterable
-from types import CodeType
+from collections.abc import Callable, Collection, Iterable
+from types import CodeType, FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from filippov.errors import InputError
 __all__ = ["Event", "EventSpec", "normalise_events"]
 
 _DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
+# Attributes of a function that `inspect.signature` heeds.
+_OTHER_SIGNATURES = {"__wrapped__", "__signature__"}
 
 
 class Event:
@@ -107,10 +109,11 @@ def normalise_events(events: Any) -> list[EventSpec] | None:
                 raise InputError(
                     f"events: entry {len(specs)} is not a function g(t, y) but {type(entry).__name__}"
                 )
-            entry = Event(
-                entry, direction=getattr(entry, "direction", 0), terminal=getattr(entry, "terminal", False)
-            )
-        specs.append(EventSpec(entry.g, entry.direction, entry.terminal, entry.name))
+            direction = check_direction(getattr(entry, "direction", 0), "events")
+            terminal = _check_terminal(getattr(entry, "terminal", False))
+            specs.append(EventSpec(entry, direction, terminal, function_name(entry, "event")))
+        else:
+            specs.append(EventSpec(entry.g, entry.direction, entry.terminal, entry.name))
     return specs
 
 
@@ -153,30 +156,28 @@ def raised_by(error: BaseException, functions: Iterable[tuple[str, Any]]) -> str
 
 def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:
     """Return those of `names` that can be handed to `function` by name."""
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # builtins and C functions have no signature
-        return []
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
-        return list(names)
-    possible = {
-        parameter.name
-        for parameter in parameters
-        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
-    }
-    return [name for name in names if name in possible]
+    possible, takes_any = _arguments(function)
+    return [name for name in names if takes_any or name in possible]
 
 
 def names_argument(function: Callable[..., Any], name: str) -> bool:
     """Whether `function` has an argument of that name; not whether it takes any, as ``**params``."""
+    return name in _arguments(function)[0]
+
+
+def _arguments(function: Callable[..., Any]) -> tuple[Collection[str], bool]:
+    """Return the arguments that can be handed to a function by name, and whether it takes any others so."""
+    if type(function) is FunctionType and function.__dict__.keys().isdisjoint(_OTHER_SIGNATURES):
+        code = function.__code__
+        names = code.co_varnames[code.co_posonlyargcount : code.co_argcount + code.co_kwonlyargcount]
+        return names, bool(code.co_flags & inspect.CO_VARKEYWORDS)
     try:
-        parameter = inspect.signature(function).parameters.get(name)
+        parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # builtins and C functions have no signature
-        return False
-    return parameter is not None and parameter.kind in (
-        parameter.POSITIONAL_OR_KEYWORD,
-        parameter.KEYWORD_ONLY,
-    )
+        return (), False
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    takes_any = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters)
+    return {parameter.name for parameter in parameters if parameter.kind in kinds}, takes_any
 
 
 def default_parameters(function: Callable[..., Any], n_given: int = 0) -> dict[str, float]:
@@ -250,7 +251,7 @@ def check_direction(direction: Any, role: str) -> float:
         number = math.nan
     if math.isnan(number):
         raise InputError(f'{role}: direction is a number, "up", "down" or "both", not {direction!r}')
-    return float(np.sign(number))
+    return float((number > 0.0) - (number < 0.0))
 
 
 def _check_terminal(terminal: Any) -> int:

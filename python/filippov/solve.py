@@ -14,7 +14,7 @@ from filippov._core import Run, RunOptions
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
-from filippov.core_events import CoreEvent, core_events
+from filippov.core_events import CoreEvent, core_events, traced_events
 from filippov.derivatives import Wanted, check_wrt, refuse_without_derivatives
 from filippov.errors import InputError, Interrupted, NonUniqueError
 from filippov.events import EventSpec, normalise_events, raised_by
@@ -35,6 +35,7 @@ from filippov.sliding_policy import SlidingPolicy, fit_kappa
 from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.system import System
+from filippov.trace.fingerprint import fingerprint
 from filippov.unknown import check_unknown
 
 __all__ = ["solve_ivp", "solve_prepared"]
@@ -238,6 +239,8 @@ class _Call(NamedTuple):
     actions: list[Any]
     states: tuple[str, ...]
     wanted: Wanted | None
+    specs: list[EventSpec] | None
+    events: list[CoreEvent]
 
 
 _MOST_CALLS = 64
@@ -251,9 +254,14 @@ def solve_prepared(
     options: Mapping[str, Any],
 ) -> Solution:
     """Solve as `solve_ivp` does, sooner if only options are given, most of all those of an earlier call."""
+    events = None
+    if "events" in options:
+        options = dict(options)
+        events = options.pop("events")
     if not options.keys() <= _OPTIONS:
-        return solve_ivp(system, t_span, y0, params=params, **options)
-    key = None if params else _key_of(options)
+        return solve_ivp(system, t_span, y0, events=events, params=params, **options)
+    specs = normalise_events(events)
+    key = None if params else _key_of(options, specs)
     call = None if key is None else system._calls.get(key)
     if call is not None:
         (t0, t1), state = check_t_span(t_span), check_y0(y0, states=system._states)
@@ -262,18 +270,20 @@ def solve_prepared(
             wanted = call.wanted
             asked = None if wanted is None else wanted.for_core()
             core_options, actions = call.core_options, call.actions
-            run = run_core(prepared.core, t0, t1, state, call.parameters, core_options, [], actions, asked)
+            run = run_core(
+                prepared.core, t0, t1, state, call.parameters, core_options, call.events, actions, asked
+            )
             if run.reason != "field_not_finite":
                 solution = _present(
-                    run, system, prepared, call.options, t0, call.states, False, None, (), wanted
+                    run, system, prepared, call.options, t0, call.states, specs, None, (), wanted
                 )
                 warns = (
                     run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
                 )
                 return _shown(solution) if warns else solution
-    solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
+    solution = _solve(system, t_span, y0, _changed(options), events, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
-        _keep_call(system, key, options, len(solution.states))
+        _keep_call(system, key, options, specs, check_y0(y0, states=system._states))
     return _shown(solution)
 
 
@@ -286,8 +296,12 @@ def solve_quietly(
     return _solve(system, t_span, y0, _changed(others), events, None, params, None, None)
 
 
-def _key_of(options: Mapping[str, Any]) -> Hashable | None:
-    """Return what tells these options from others, if that is known."""
+def _key_of(options: Mapping[str, Any], specs: list[EventSpec] | None) -> Hashable | None:
+    """Return what tells these options and events from others, if that is known."""
+    if specs is not None:
+        read = [(fingerprint(spec.g), *spec[1:]) for spec in specs]
+        key = _key_of(options, None)
+        return None if key is None or any(one[0] is None for one in read) else (key, *read)
     if "wrt" not in options:
         return repeatable_key(options)
     others = dict(options)
@@ -309,7 +323,10 @@ def _shown(solution: Solution) -> Solution:
     return solution
 
 
-def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) -> None:
+def _keep_call(
+    system: System, key: Hashable, given: Mapping[str, Any], specs: list[EventSpec] | None, y0: Array
+) -> None:
+    n = len(y0)
     values = system.parameter_values(None)
     changed = _changed(given)
     wrt, order = changed.pop("wrt", None), changed.pop("order", 1)
@@ -317,8 +334,11 @@ def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) 
     states = system.state_names(n)
     if options.nonunique != "branch":
         prepared = system.prepare(n, 0.0, None, values)
-        if prepared.doubts:  # warned of at every call
+        prepared, traced = traced_events(specs or [], system, prepared, 0.0, y0, (), values)
+        # What is warned of at every call is not kept.
+        if prepared.doubts or any(isinstance(one, str) for one in traced):
             return
+        found: list[CoreEvent] = [(one, *spec[1:]) for one, spec in zip(traced, specs or [], strict=True)]
         system._calls[key] = _Call(
             prepared,
             options,
@@ -327,6 +347,8 @@ def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) 
             list(prepared.actions),
             states,
             None if wrt is None else check_wrt(wrt, states, values, system.discrete, order),
+            specs,
+            found,
         )
 
 
@@ -390,13 +412,12 @@ def _solve(
                     run, used = beyond, ending
                 if run.status >= 0:
                     break
-        has_events = specs is not None
-        solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
+        solution = _present(run, system, used, options, t0, states, specs, values, functions, wanted)
         if used.trace is not None and used.trace.root_ends == "floor":
             # The end of a root is as steep as a jump.
             solution.warnings = [found for found in solution.warnings if found.code != "undeclared_jump"]
-        if specs or wanted is not None:
-            solution._origin = solution._origin._replace(events=tuple(specs or ()), args=constants)
+        if constants:
+            solution._origin = solution._origin._replace(args=constants)
         return solution
 
     solution = follow(())
@@ -412,9 +433,9 @@ def _present(
     options: Options,
     t0: float,
     states: tuple[str, ...],
-    has_events: bool,
+    specs: list[EventSpec] | None,
     values: dict[str, float] | None,
-    events: Sequence[tuple[str, Any]] = (),
+    functions: Sequence[tuple[str, Any]] = (),
     wanted: Wanted | None = None,
 ) -> Solution:
     """Present what the core computed; raise what the options ask to raise."""
@@ -426,16 +447,17 @@ def _present(
         values=values,
         t0=t0,
         states=states,
-        has_events=has_events,
+        has_events=specs is not None,
         dense_output=dense_output,
         wanted=wanted,
+        events=tuple(specs or ()),
     )
     if run.reason == "field_not_finite" and isinstance(run, Run):
         given = system.parameter_values(None) if values is None else values
         solution.message += system.line_not_finite(run, given)
     if run.error is not None:
         own = [] if system._source is None else system._source.named_functions()
-        raising = raised_by(run.error, [*own, *events])
+        raising = raised_by(run.error, [*own, *functions])
         if raising:
             solution.message = solution.message.replace("the right-hand side", raising, 1)
     if options.progress is not None:

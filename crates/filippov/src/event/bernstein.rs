@@ -117,6 +117,43 @@ fn only_change(b: &[f64], positive: usize, (lo, hi): (f64, f64), noise: f64) -> 
     Some(FirstZero::Between { lo, hi, guess })
 }
 
+/// Calls `found` with (lo, hi) and about where each zero is of a polynomial with Bernstein coefficients `b` from `lo` to
+/// `hi`: between these two it is the only one. False if the signs do not tell, or some are within `noise` of zero.
+pub(super) fn each_zero_between(
+    b: &mut [f64],
+    (lo, hi): (f64, f64),
+    noise: f64,
+    halvings: u32,
+    found: &mut impl FnMut((f64, f64), f64),
+) -> bool {
+    let sign = b[0].signum();
+    b.iter_mut().for_each(|b| *b *= sign);
+    let positive = b.iter().take_while(|&&b| b > noise).count();
+    if positive == b.len() {
+        return true;
+    }
+    if positive == 0 {
+        return false;
+    }
+    if let Some(FirstZero::Between { guess, .. }) = only_change(b, positive, (lo, hi), noise) {
+        found((lo, hi), guess);
+        return true;
+    }
+    if halvings == 0 {
+        return false;
+    }
+    let mut first = NO_TERMS;
+    let first = &mut first[..b.len()];
+    first.copy_from_slice(b);
+    halve(first);
+    b.reverse();
+    halve(b);
+    b.reverse();
+    let middle = 0.5 * (lo + hi);
+    each_zero_between(first, (lo, middle), noise, halvings - 1, found)
+        && each_zero_between(b, (middle, hi), noise, halvings - 1, found)
+}
+
 /// Makes Bernstein coefficients those of the first half, and reversed ones those of the second: de Casteljau's means of
 /// neighbours, halved at the end.
 fn halve(b: &mut [f64]) {

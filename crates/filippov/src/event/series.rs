@@ -1,11 +1,12 @@
 //! A monitored function along a step as a power series.
 
 use filippov_expr::Interval;
+use smallvec::SmallVec;
 
-use super::bernstein::{first_zero_between, to_bernstein, HALVINGS};
+use super::bernstein::{each_zero_between, first_zero_between, to_bernstein, HALVINGS};
 use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
-use crate::tolerances::{EPS, REST_BESIDE, SAME_VALUE};
+use crate::tolerances::{EPS, REST_BESIDE, SAME_VALUE, SMALL_REST};
 
 pub use super::bernstein::{FirstZero, NO_TERMS};
 
@@ -80,13 +81,35 @@ impl<'a> Series<'a> {
         b.iter().all(|&b| b > margin + first.rest)
     }
 
-    /// Does it change its sign exactly once on [0, 1]? By Descartes' rule, where all Bernstein coefficients are clear of `margin`.
-    pub fn has_one_zero(&self, margin: f64) -> bool {
+    /// All zeros on [0, 1], each within `width`, in order; none if its Bernstein coefficients do not tell them apart, or come
+    /// within `noise` of zero.
+    pub fn all_zeros(&self, noise: f64, width: f64) -> Option<SmallVec<[f64; 4]>> {
+        let told = |spare: f64| self.zeros_by(self.first_terms(spare), noise, width);
+        told(SMALL_REST * self.0[0].abs()).or_else(|| told(0.0))
+    }
+
+    /// The same by the signs of the first terms.
+    fn zeros_by(&self, first: FirstTerms, noise: f64, width: f64) -> Option<SmallVec<[f64; 4]>> {
         let mut coefficients = NO_TERMS;
-        let b = &mut coefficients[..self.0.len()];
+        let b = &mut coefficients[..first.used];
         to_bernstein(self.0, b);
-        let n_changes = b.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-        n_changes == 1 && b.iter().all(|b| b.abs() > margin)
+        let mut falling = NO_TERMS;
+        let falling = &mut falling[..self.0.len()];
+        falling.copy_from_slice(self.0);
+        // Positive where the search begins, and behind each zero turned to be so again.
+        let turn = |falling: &mut [f64]| falling.iter_mut().for_each(|c| *c = -*c);
+        if self.0[0] < 0.0 {
+            turn(falling);
+        }
+        let (mut zeros, mut is_single) = (SmallVec::new(), true);
+        let mut add = |between, guess| {
+            let (zero, slope) = Series(falling).only_zero(between, guess, width);
+            is_single &= self.is_single(slope, first.rest);
+            zeros.push(zero);
+            turn(falling);
+        };
+        let is_told = each_zero_between(b, (0.0, 1.0), noise + first.rest, HALVINGS, &mut add);
+        (is_told && is_single).then_some(zeros)
     }
 
     /// Is it beyond `margin` on the side of this sign, on [0, 1]?
@@ -303,6 +326,40 @@ mod tests {
         for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
             let series = Series::new(&coefficients);
             assert_eq!(series.first_zero(1.0, 0.0, 0.0).0, FirstZero::Unknown);
+        }
+    }
+
+    #[test]
+    fn all_zeros_are_told_apart_or_none_is() {
+        let mut number = random_numbers(5);
+        for _ in 0..500 {
+            let mut roots: Vec<f64> = (0..4).map(|_| 1.4 * number() - 0.2).collect();
+            roots.sort_by(f64::total_cmp);
+            // With two complex ones.
+            let mut coefficients = vec![1.3, -2.0 * number(), 1.0];
+            for root in &roots {
+                coefficients.push(0.0);
+                for k in (1..coefficients.len()).rev() {
+                    coefficients[k] = coefficients[k - 1] - root * coefficients[k];
+                }
+                coefficients[0] *= -root;
+            }
+            roots.retain(|root| (0.0..=1.0).contains(root));
+            if let Some(zeros) = Series::new(&coefficients).all_zeros(1e-14, 1e-15) {
+                assert_eq!(zeros.len(), roots.len(), "{roots:?}");
+                assert!(zeros.iter().zip(&roots).all(|(a, b)| (a - b).abs() < 1e-9));
+            } else {
+                let all = [0.0, 1.0].iter().chain(&roots).copied();
+                let mut gaps = all.clone().flat_map(|a| {
+                    let all = all.clone();
+                    all.map(move |b| (a - b).abs()).filter(|gap| *gap > 0.0)
+                });
+                assert!(gaps.any(|gap| gap < 1e-2), "{roots:?}");
+            }
+        }
+        // A double zero, and one at an end.
+        for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
+            assert_eq!(Series::new(&coefficients).all_zeros(1e-14, 1e-15), None);
         }
     }
 

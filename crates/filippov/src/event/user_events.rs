@@ -14,6 +14,17 @@ pub struct UserZero {
     pub y: Vec<f64>,
 }
 
+/// What happens at the end of a step, for the functions of a user.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StepEnd {
+    /// The motion goes on from there: where a function jumps with a sign, the next step tells.
+    GoesOn,
+    /// Discrete states change, and no state: every function may jump there, and the next step tells.
+    Law,
+    /// The state jumps, or the run ends.
+    Stops,
+}
+
 /// The user's functions and their zeros so far.
 pub(crate) struct UserEvents<'a> {
     pub events: &'a [UserEvent<'a>],
@@ -27,8 +38,8 @@ pub(crate) struct UserEvents<'a> {
     pub found_sides: RefCell<Vec<f64>>,
     /// Discrete states, as they were when the motion began.
     q: Vec<f64>,
-    /// Do discrete states change at the end of the step that is searched, and no state?
-    pub ends_at_law: bool,
+    /// What happens at the end of the step that is searched.
+    pub end: StepEnd,
     /// Have they changed where the motion began? Every function may have jumped there.
     pub may_have_jumped: bool,
     /// Time of the last zero, per event: divided out while it is the start of the search.
@@ -52,7 +63,7 @@ impl<'a> UserEvents<'a> {
             sides: vec![0.0; d],
             found_sides: RefCell::new(vec![0.0; d]),
             q: Vec::new(),
-            ends_at_law: false,
+            end: StepEnd::GoesOn,
             may_have_jumped: false,
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
@@ -67,7 +78,7 @@ impl<'a> UserEvents<'a> {
         for (event, left) in self.events.iter().zip(&mut self.left) {
             *left = event.function.value(t, x, q)?;
         }
-        self.may_have_jumped = self.ends_at_law || self.q != q;
+        self.may_have_jumped = self.end == StepEnd::Law || self.q != q;
         self.q.clear();
         self.q.extend_from_slice(q);
         Ok(())

@@ -18,7 +18,7 @@ use crate::action::Timetable;
 use crate::decisions::{differs_between_sides, has_left_zero_surface, lost_guards, Cause};
 use crate::error::{Error, FieldError};
 use crate::event::search::{Detector, StepSearch};
-use crate::event::{Event, Found};
+use crate::event::{Event, Found, StepEnd};
 use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::{Progress, Reached};
 use crate::integrate::watch::Watch;
@@ -308,7 +308,7 @@ impl<'a> Integrator<'a> {
         let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
         if !self.recorder.user_events.events.is_empty() {
-            self.recorder.user_events.ends_at_law = self.ends_at_law(found.as_ref(), t_stop);
+            self.recorder.user_events.end = self.end_of_step(found.as_ref(), t_stop);
         }
         let (mut search, recorder) = self.step_search();
         let Some(zeros) = recorder.find_user_zeros(&mut search, theta, t_stop)? else {
@@ -392,23 +392,27 @@ impl<'a> Integrator<'a> {
         self.switch(&event)
     }
 
-    /// Do discrete states change at the end of the step, and no state? A function of the user may jump there.
+    /// What happens at the end of the step, at `t_stop`, where these guards vanish.
     #[cold]
-    fn ends_at_law(&self, found: Option<&Found>, t_stop: f64) -> bool {
+    fn end_of_step(&self, found: Option<&Found>, t_stop: f64) -> StepEnd {
         let triggers = self.run.motion.triggers(self.run.system);
-        let follows_law = |guard: &Guard| match guard {
-            Guard::Surface(j) => triggers.follows_law(*j),
-            _ => false,
-        };
-        if found.is_some_and(|event| event.guards.iter().any(follows_law)) {
-            return true;
+        let guards = || found.iter().flat_map(|event| &event.guards);
+        let is_tick = t_stop >= self.horizon && self.horizon < self.t_end;
+        let mut timed = self.run.actions.list.iter().filter(|action| {
+            is_tick && !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump)
+        });
+        let moves_state = guards().any(|guard| match guard {
+            Guard::Surface(j) => triggers.at(*j).any(|action| action.map.moves_state()),
+            _ => true,
+        }) || timed.any(|action| action.map.moves_state());
+        let follows_law =
+            |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.follows_law(*j));
+        match () {
+            () if guards().any(follows_law) => StepEnd::Law,
+            () if moves_state || t_stop >= self.t_end => StepEnd::Stops,
+            () if is_tick => StepEnd::Law,
+            () => StepEnd::GoesOn,
         }
-        let timed = self.run.actions.list.iter();
-        let mut timed = timed
-            .filter(|action| !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump));
-        t_stop >= self.horizon
-            && self.horizon < self.t_end
-            && timed.all(|action| !action.map.moves_state())
     }
 
     /// The search of the step that was computed; and the record of what it finds.

@@ -13,7 +13,8 @@ pub(crate) struct Triggers<'p> {
 }
 
 impl Triggers<'_> {
-    fn at(&self, j: usize) -> impl Iterator<Item = &Action<'_>> {
+    /// The actions that the surface triggers.
+    pub fn at(&self, j: usize) -> impl Iterator<Item = &Action<'_>> {
         let is_here = move |action: &&Action| matches!(action.trigger, Trigger::Surface { index, .. } if index == j);
         self.actions.list.iter().filter(is_here)
     }

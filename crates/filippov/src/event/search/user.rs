@@ -10,7 +10,7 @@ use smallvec::{smallvec, SmallVec};
 use super::user_piece::{value_along, Along, Outcome, Source, Start};
 use super::StepSearch;
 use crate::error::FieldError;
-use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
+use crate::event::{SmoothParts, StepEnd, UserEvent, UserEvents, UserFunction};
 use crate::mode::Signs;
 use crate::tolerances::{
     MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
@@ -48,8 +48,8 @@ struct Cuts {
     start: Signs,
     /// (theta, index of the sign, sign after), in order of theta.
     changes: SmallVec<[(f64, usize, f64); 4]>,
-    /// May the function jump at the end of the step, with discrete states? The next step tells.
-    ends_with_one: bool,
+    /// What happens at the end of the step.
+    end: StepEnd,
 }
 
 impl Cuts {
@@ -88,6 +88,18 @@ struct AtStart {
     is_known_zero: bool,
     /// May the function, smooth as it is, have jumped there?
     may_have_jumped: bool,
+}
+
+impl AtStart {
+    /// The start of a piece of a smooth function.
+    fn of_piece(self, from: f64) -> Start {
+        Start {
+            from,
+            divided: self.is_known_zero,
+            sign: side(self.before),
+            clear: 0.0,
+        }
+    }
 }
 
 impl StepSearch<'_, '_> {
@@ -167,6 +179,14 @@ impl StepSearch<'_, '_> {
             let changes = self.changes_along(along, &Cuts::none(0), theta, start)?;
             return Ok(changes.map(|found| found.0));
         };
+        if parts.n_inner() == 0 && !events.may_have_jumped {
+            let told = self.zeros_of_affine(parts, left, start.of_piece(0.0), theta);
+            if let Some((sign, zeros)) = told {
+                let mut changes = Vec::new();
+                events.found_sides.borrow_mut()[index] = add_changes(sign, &zeros, &mut changes);
+                return Ok(Some(changes));
+            }
+        }
         let mut cuts = Cuts::none(parts.n_inner());
         start.may_have_jumped = events.may_have_jumped;
         if parts.n_inner() > 0 || events.may_have_jumped {
@@ -180,7 +200,7 @@ impl StepSearch<'_, '_> {
             }
         }
         let whole = Source::Part(parts, parts.n_inner());
-        cuts.ends_with_one = events.ends_at_law;
+        cuts.end = events.end;
         let changes = self.changes_along(whole, &cuts, theta, start)?;
         if let Some((_, side)) = &changes {
             events.found_sides.borrow_mut()[index] = *side;
@@ -215,8 +235,14 @@ impl StepSearch<'_, '_> {
         let Some((changes, _)) = self.changes_along(source, cuts, theta, known)? else {
             return Ok(false);
         };
-        let changes = changes.iter().map(|change| (change.at, part, change.after));
-        cuts.changes.extend(changes);
+        let together = self.together(self.stepper.interpolant().dt);
+        for change in &changes {
+            // Signs that change up to rounding at one time do so at one.
+            let mut known = cuts.changes.iter().map(|known| known.0);
+            let at = known.find(|known| (known - change.at).abs() <= together);
+            cuts.changes
+                .push((at.unwrap_or(change.at), part, change.after));
+        }
         sort_few(&mut cuts.changes, |a, b| a.0.total_cmp(&b.0).is_lt());
         Ok(true)
     }
@@ -274,15 +300,11 @@ impl StepSearch<'_, '_> {
             let signs = cuts.signs_behind(from);
             let along = Along::new(source, &signs, self);
             let mut start = match along.is_smooth() && !before.may_have_jumped {
-                true => Start {
-                    from,
-                    divided: before.is_known_zero,
-                    sign: side(before.before),
-                    clear: 0.0,
-                },
+                true => before.of_piece(from),
                 false => self.enter(&along, (from, to), before, &mut changes)?,
             };
-            let kink = to < theta || cuts.ends_with_one || cuts.has_change_from(theta - together);
+            let ends_at_law = cuts.end == StepEnd::Law;
+            let kink = to < theta || ends_at_law || cuts.has_change_from(theta - together);
             if !self.search_piece_of(&along, &mut start, (to, theta, kink), &mut changes)? {
                 return Ok(None);
             }
@@ -293,9 +315,9 @@ impl StepSearch<'_, '_> {
             };
             from = to;
         }
-        // A jump at the very end.
+        // A jump at the very end, which no other step tells.
         let is_known = changes.last().is_some_and(|change| change.at == theta);
-        if cuts.has_change_from(before_end(theta)) && !is_known {
+        if cuts.end == StepEnd::Stops && cuts.has_change_from(before_end(theta)) && !is_known {
             let along = Along::new(source, &cuts.signs_behind(theta), self);
             let end = self.enter(&along, (theta, theta), before, &mut changes)?;
             before.before = end.sign;
@@ -316,9 +338,10 @@ impl StepSearch<'_, '_> {
         (to_end, theta, kink): (f64, f64, bool),
         changes: &mut Vec<Change>,
     ) -> Result<bool, FieldError> {
-        if along.is_clear(*start, to_end) {
-            start.from = to_end;
-            return Ok(true);
+        if let Some((sign, zeros)) = along.zeros_of_series(self, *start, to_end) {
+            start.sign = add_changes(sign, &zeros, changes);
+            (start.from, start.divided) = (to_end, false);
+            return Ok(changes.len() <= MOST_ZEROS);
         }
         let together = self.together(self.stepper.interpolant().dt);
         let mut ends = self.sampled_pieces(along, start.from, to_end);
@@ -433,18 +456,18 @@ impl StepSearch<'_, '_> {
         Ok(false)
     }
 
-    /// The sign of a function that is zero where it is entered, or is not defined there, as near behind as it is clear of rounding.
+    /// The sign of a function that is zero where it is entered, or is not defined there, as near behind as it is clear of rounding;
+    /// 0 if it is nowhere.
     fn first_sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<f64, FieldError> {
-        let last = 1e-7 * (to - from);
         let mut behind = self.together(self.stepper.interpolant().dt);
-        while behind < last {
+        while behind < to - from {
             let value = along.value(self, from + behind)?;
             if value.abs() > along.rounding(self, from + behind) {
                 return Ok(sign_of(value));
             }
             behind *= 8.0;
         }
-        Ok(sign_of(along.value(self, from + last)?))
+        Ok(0.0)
     }
 
     /// The sign behind a zero, where it is clear of rounding, and how far behind: nearer to a multiple zero, or to one of a steep
@@ -494,9 +517,20 @@ impl Cuts {
         Cuts {
             start: smallvec![0.0; n],
             changes: SmallVec::new(),
-            ends_with_one: false,
+            end: StepEnd::GoesOn,
         }
     }
+}
+
+/// Adds the changes at zeros of a function that has this sign before the first; returns the sign behind the last.
+fn add_changes(sign: f64, zeros: &[f64], changes: &mut Vec<Change>) -> f64 {
+    let mut before = sign;
+    for &at in zeros {
+        let after = -before;
+        changes.push(Change { at, before, after });
+        before = after;
+    }
+    before
 }
 
 /// A little less.

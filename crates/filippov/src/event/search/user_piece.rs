@@ -69,6 +69,71 @@ pub(super) enum Source<'f> {
     Part(&'f dyn SmoothParts, usize),
 }
 
+/// A part that is affine is a polynomial along the step, unless the motion is drawn back to a curved surface.
+fn affine_series(
+    parts: &dyn SmoothParts,
+    part: usize,
+    search: &mut StepSearch,
+    start: impl FnOnce(&mut StepSearch) -> Result<f64, FieldError>,
+) -> Option<SmallVec<[f64; 32]>> {
+    let affine = parts
+        .affine(part)
+        .filter(|_| search.run.motion.is_straight)?;
+    let start = start(search).ok()?;
+    let interpolant = search.stepper.interpolant();
+    let (n, rows) = (interpolant.n_states(), interpolant.coefficients());
+    let n_terms = rows.len() / n;
+    if n_terms < 2 || n_terms > NO_TERMS.len() {
+        return None;
+    }
+    let mut series: SmallVec<[f64; 32]> = SmallVec::from_elem(0.0, n_terms);
+    for &(i, slope) in &affine.slopes {
+        let column = rows[i as usize..].iter().step_by(n);
+        series
+            .iter_mut()
+            .zip(column)
+            .for_each(|(term, c)| *term += slope * c);
+    }
+    series[0] = start;
+    series[1] += affine.of_time * interpolant.dt;
+    if interpolant.basis() == Basis::Nested {
+        powers_of_nested(&mut series);
+    }
+    Some(series)
+}
+
+/// What a series tells of a piece of a step: the sign behind its start, and the zeros.
+pub(super) type Told = (f64, SmallVec<[f64; 4]>);
+
+/// What a series along the step tells of the piece up to `to`; none if it leaves a doubt.
+fn zeros_of_series(rows: &[f64], search: &StepSearch, start: Start, to: f64) -> Option<Told> {
+    // A zero at the start of the step is divided out.
+    let divided = usize::from(start.divided && start.from == 0.0);
+    let rows = &rows[divided..];
+    let others: f64 = rows[1..].iter().map(|c| c.abs()).sum();
+    let size = others + rows[0].abs();
+    if start.from == 0.0 && rows[0].abs() > others + ROUNDING * size {
+        let sign = rows[0].signum();
+        return (divided == 1 || sign == start.sign).then_some((sign, SmallVec::new()));
+    }
+    let interpolant = search.stepper.interpolant();
+    let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
+    let beside = 4.0 * search.together(interpolant.dt);
+    let mut zeros = Series::new(rows).all_zeros(ROUNDING * size, width)?;
+    let count = |is_there: &dyn Fn(f64) -> bool| zeros.iter().filter(|&&at| is_there(at)).count();
+    let n_before = count(&|at| at <= start.from + beside);
+    let n_at_start = count(&|at| (at - start.from).abs() <= beside);
+    let n_at_end = count(&|at| (at - to).abs() <= beside);
+    let turns = if n_before % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = turns * rows[0].signum();
+    // A zero at the end needs a closer look.
+    let is_clear = n_at_start == usize::from(start.divided) - divided
+        && n_at_end == 0
+        && (start.divided || sign == start.sign);
+    zeros.retain(|at| *at > start.from + beside && *at < to);
+    is_clear.then_some((sign, zeros))
+}
+
 /// A function along a piece of a step.
 pub(super) struct Along<'f> {
     source: Source<'f>,
@@ -87,7 +152,9 @@ impl<'f> Along<'f> {
             series: None,
             y: RefCell::new(smallvec![0.0; search.run.x.len()]),
         };
-        along.series = along.affine_series(search);
+        if let Source::Part(parts, part) = source {
+            along.series = affine_series(parts, part, search, |search| along.value(search, 0.0));
+        }
         along
     }
 
@@ -134,63 +201,9 @@ impl<'f> Along<'f> {
         Ok(parts.value(part, &setting.at(t, &y)))
     }
 
-    /// An affine function is a polynomial along the step, unless the motion is drawn back to a curved surface.
-    fn affine_series(&self, search: &mut StepSearch) -> Option<SmallVec<[f64; 32]>> {
-        let Source::Part(parts, part) = self.source else {
-            return None;
-        };
-        let affine = parts
-            .affine(part)
-            .filter(|_| search.run.motion.is_straight)?;
-        let start = self.value(search, 0.0).ok()?;
-        let interpolant = search.stepper.interpolant();
-        let n = interpolant.n_states();
-        let rows = interpolant.coefficients().chunks_exact(n);
-        let slopes = || affine.slopes.iter();
-        let row = |row: &[f64]| slopes().map(|&(i, c)| c * row[i as usize]).sum();
-        let mut series: SmallVec<[f64; 32]> = rows.map(row).collect();
-        if series.len() < 2 || series.len() > NO_TERMS.len() {
-            return None;
-        }
-        series[0] = start;
-        series[1] += affine.of_time * interpolant.dt;
-        if interpolant.basis() == Basis::Nested {
-            powers_of_nested(&mut series);
-        }
-        Some(series)
-    }
-
-    /// Does the series tell at once that there is no zero behind the start, up to `to`?
-    pub fn is_clear(&self, start: Start, to: f64) -> bool {
-        let Some(rows) = &self.series else {
-            return false;
-        };
-        let series = Series::new(rows);
-        let size: f64 = rows.iter().map(|c| c.abs()).sum();
-        if start.divided {
-            // The zero at the start of the search is the only one, or the function rises or falls throughout.
-            return start.from > 0.0 && series.has_one_zero(ROUNDING * size)
-                || !series.bound(start.from, to).slope.contains_zero();
-        }
-        start.from == 0.0 && series.has_sign(start.sign, ROUNDING * size)
-    }
-
-    /// The only zero in the step, from its start on, if the series has one that is far from rounding.
-    fn only_zero(&self, search: &StepSearch, start: Start) -> Option<f64> {
-        let is_whole = start.from == 0.0 && !start.divided;
-        let rows = self.series.as_ref().filter(|_| is_whole)?;
-        let signed: SmallVec<[f64; 32]> = rows.iter().map(|c| start.sign * c).collect();
-        let series = Series::new(&signed);
-        let size: f64 = rows.iter().map(|c| c.abs()).sum();
-        let noise = ROUNDING * size;
-        let [left, right] = series.ends();
-        if left <= noise || right >= -noise || !series.has_one_zero(noise) {
-            return None;
-        }
-        let interpolant = search.stepper.interpolant();
-        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
-        let (at, _) = series.only_zero((0.0, 1.0), left / (left - right), width);
-        Some(at)
+    /// What the series tells of the piece up to `to`; none if there is no series, or one that leaves a doubt.
+    pub fn zeros_of_series(&self, search: &StepSearch, start: Start, to: f64) -> Option<Told> {
+        zeros_of_series(self.series.as_ref()?, search, start, to)
     }
 
     /// How well the function is known at a point of the step; 0 for a smooth one, of which its values tell.
@@ -237,6 +250,18 @@ impl<'f> Along<'f> {
 }
 
 impl StepSearch<'_, '_> {
+    /// What its series tells of a smooth affine function up to `to`, with this value at the start.
+    pub(super) fn zeros_of_affine(
+        &mut self,
+        parts: &dyn SmoothParts,
+        value: f64,
+        start: Start,
+        to: f64,
+    ) -> Option<Told> {
+        let rows = affine_series(parts, parts.n_inner(), self, |_| Ok(value))?;
+        zeros_of_series(&rows, self, start, to)
+    }
+
     /// The first zero up to `to`, which `is_last` says to be the end of the search.
     pub(super) fn search_user_piece(
         &mut self,
@@ -246,14 +271,6 @@ impl StepSearch<'_, '_> {
         is_last: bool,
     ) -> Result<Outcome, FieldError> {
         let beside = self.together(self.stepper.interpolant().dt);
-        // One at the end of the search needs a closer look.
-        let expected = along.only_zero(self, start);
-        if let Some(at) = expected.filter(|at| (at - to).abs() > 4.0 * beside) {
-            return Ok(match at < to {
-                true => Outcome::At(at),
-                false => Outcome::Nothing,
-            });
-        }
         let Start {
             from,
             divided,
