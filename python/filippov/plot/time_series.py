@@ -201,7 +201,7 @@ def _free_share(ax: Any) -> float:
     letters = _LINES_OF_LETTERS * FontProperties(size=_SIZE_OF_LETTERS).get_size_in_points()
     height = 72.0 / ax.figure.dpi * ax.bbox.height
     share = min(_STRIP_SLIDING + _GAP + letters / height, _MOST_FREE)
-    return max(_FREE, share / (1.0 - 2.0 * share))
+    return float(max(_FREE, share / (1.0 - 2.0 * share)))
 
 
 def _line_style(row: int, width: float) -> Any:
