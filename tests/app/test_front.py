@@ -249,6 +249,17 @@ def test_a_link_that_is_no_good_is_answered_in_words(open_page: Any, fragment: s
     assert words in page.locator(".complaint").inner_text()
 
 
+def test_what_a_link_carries_is_text_and_no_code(open_page: Any) -> None:
+    code = "<img src=x onerror='window.wasRun = 1'><script>window.wasRun = 1</script>"
+    model = model_bytes("dry_friction", title=code, text=code, reference=code)
+    view = json.dumps({"method": "auto", "section": {"by": "surface", "surface": code}, "parameter": code})
+    page = open_page(f"#m={packed(model)}&s={packed(view.encode())}")
+    show(page, "Model")
+    assert page.locator("textarea").input_value() == code
+    assert page.locator("#app img, #app script").count() == 0
+    assert page.evaluate("window.wasRun") is None
+
+
 def test_a_page_without_its_engine_says_so(open_page: Any) -> None:
     script = """const get = window.fetch;
     window.fetch = (a, ...b) => String(a).endsWith(".wasm") ? Promise.reject(new Error()) : get(a, ...b);"""
@@ -428,12 +439,17 @@ def test_light_and_dark(open_page: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["dry_friction", "friction_chain"])
-@pytest.mark.parametrize("width", [360, 768, 1400])
+@pytest.mark.parametrize("width", [360, 768, 1200, 1400])
 def test_the_page_fits_its_window_and_canvases_have_their_real_pixels(
     open_page: Any, width: int, name: str
 ) -> None:
     page = open_page(f"#p={name}", viewport={"width": width, "height": 844}, device_scale_factor=2)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    sides = "f => [f.lastElementChild.getBoundingClientRect(), ...f.querySelectorAll('.tools > *')].map(e => "
+    sides += "(e.getBoundingClientRect?.() ?? e).right)"
+    for figure in page.locator("section.figure").all():
+        edge, *tools = figure.evaluate(sides)
+        assert max([0, *tools]) <= edge + 1, "what stands above a picture does not reach into the next one"
     for picture in ("portrait", "series"):
         size = page.locator(f".{picture} canvas").evaluate(
             "c => [c.width, c.clientWidth, c.height, c.clientHeight]"

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
+from app.static_site import STATIC, model_bytes
+
 # A widget's model as anywidget hands it over; its kernel answers nothing by itself.
-_RENDER = """async ({ withWasm }) => {
+_RENDER = """async ({ model, wasm, withWasm }) => {
   const front = await import("/app.js");
-  const bytes = async name => new DataView(await (await fetch(name)).arrayBuffer());
+  const bytes = text => new DataView(Uint8Array.from(atob(text), letter => letter.charCodeAt(0)).buffer);
   const traits = {
-    model: await bytes("/models/dry_friction.flp"),
-    wasm: withWasm ? await bytes("/filippov.wasm") : new DataView(new ArrayBuffer(0)),
+    model: bytes(model),
+    wasm: bytes(wasm),
     kinds: ["describe", "run", "cycle", "continuation", "script"],
     params: { F: 0.3, omega: 1 },
     y0: [0.5, 1],
@@ -54,11 +57,18 @@ def cell(site: str, browser: Any) -> Iterator[Any]:
     assert faults == []
 
 
+def traits(*, with_wasm: bool = True) -> dict[str, Any]:
+    """Return what the kernel hands over, for `_RENDER`."""
+    wasm = (STATIC / "filippov.wasm").read_bytes() if with_wasm else b""
+    texts = (base64.b64encode(part).decode() for part in (model_bytes("dry_friction"), wasm))
+    return {**dict(zip(("model", "wasm"), texts, strict=True)), "withWasm": with_wasm}
+
+
 _FRONT = "document.querySelector('#cell').lastChild.front"
 
 
 def test_the_widget_shows_its_traits_and_follows_them(cell: Any) -> None:
-    cell.evaluate(_RENDER, {"withWasm": True})
+    cell.evaluate(_RENDER, traits())
     assert cell.evaluate(f"{_FRONT}.run.y.slice(0, 2)") == [0.5, 1]
     assert cell.evaluate(f"{_FRONT}.state.params") == {"F": 0.3, "omega": 1}
     cell.evaluate("widget.set('params', { F: 0.9, omega: 1 }); widget.fire('change:params')")
@@ -69,7 +79,7 @@ def test_the_widget_shows_its_traits_and_follows_them(cell: Any) -> None:
 
 
 def test_a_slider_writes_the_traits_once(cell: Any) -> None:
-    cell.evaluate(_RENDER, {"withWasm": True})
+    cell.evaluate(_RENDER, traits())
     cell.get_by_role("slider", name="parameter F").press("ArrowRight")
     cell.evaluate(f"{_FRONT}.settled()")
     value = cell.evaluate("widget.get('params').F")
@@ -82,16 +92,69 @@ def test_a_slider_writes_the_traits_once(cell: Any) -> None:
 
 
 def test_a_widget_that_is_closed_leaves_nothing(cell: Any) -> None:
-    cell.evaluate(_RENDER, {"withWasm": True})
+    cell.evaluate(_RENDER, traits())
     cell.evaluate("end()")
     assert cell.evaluate("widget.listening()") == 0
     assert cell.evaluate("document.querySelector('#cell').lastChild.childElementCount") == 0
 
 
 def test_without_webassembly_the_kernel_is_asked(cell: Any) -> None:
-    cell.evaluate(_RENDER, {"withWasm": False})
+    cell.evaluate(_RENDER, traits(with_wasm=False))
     cell.evaluate("new Promise(go => setTimeout(go, 50))")
     assert cell.evaluate("widget.asked") == [{"kind": "ask", "id": 1, "request": {"kind": "describe"}}]
     cell.evaluate("widget.fire('msg:custom', { kind: 'reply', id: 1, error: 'the kernel has no model' }, [])")
     cell.evaluate("new Promise(go => setTimeout(go, 50))")
     assert "the kernel has no model" in cell.locator("#cell").inner_text()
+
+
+# That of VS Code for the outputs of notebooks, if `notebook.experimental.enableCsp` is set (by default there
+# is none), with this site for its own files: no worker from a blob, and no request but to https.
+_VS_CODE = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' https: http: data:; font-src 'self' https:; connect-src https:; child-src https: data:"
+)
+# That of a webview with a nonce, which lets its scripts load others.
+_NONCE = (
+    "default-src 'none'; script-src 'nonce-a1' 'strict-dynamic' 'wasm-unsafe-eval'; style-src 'unsafe-inline'"
+)
+_POLICIES = {
+    "VS Code": _VS_CODE,
+    "nonce": _NONCE,
+    "nonce and workers": f"{_NONCE}; worker-src blob:",
+}
+
+
+def under(cell: Any, policy: str) -> None:
+    """Open a page that its policy keeps from all else."""
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}"><title>cell</title>'
+    body = (
+        f'<!doctype html><html lang="en"><head>{head}</head>'
+        '<body class="vscode-body" data-vscode-theme-kind="vscode-dark">'
+        '<script nonce="a1">window.load = () => import("/app.js");</script></body></html>'
+    )
+    cell.route("**/models/index.json", lambda route: route.fulfill(content_type="text/html", body=body))
+    cell.reload()
+
+
+@pytest.mark.parametrize("policy", _POLICIES)
+def test_the_widget_works_under_the_policy_of_a_webview(cell: Any, policy: str) -> None:
+    asked: list[str] = []
+    under(cell, _POLICIES[policy])
+    cell.on("request", lambda request: asked.append(request.url))
+    cell.evaluate(_RENDER.replace('import("/app.js")', "window.load()"), traits())
+    assert cell.evaluate(f"{_FRONT}.run.switches.length") > 0
+    assert cell.evaluate(f"{_FRONT}.theme.name") == "dark", "the colours are those of the editor"
+    assert cell.evaluate("widget.asked") == [], "the page computes, not the kernel"
+    cell.get_by_role("slider", name="parameter F").press("ArrowRight")
+    cell.evaluate(f"{_FRONT}.settled()")
+    assert cell.evaluate("widget.get('params').F") > 0.3
+    assert [address for address in asked if not address.startswith("blob:")] == [
+        cell.url.split("/models")[0] + "/app.js"
+    ]
+
+
+def test_a_policy_without_webassembly_leaves_the_work_to_the_kernel(cell: Any) -> None:
+    under(cell, _NONCE.replace("'wasm-unsafe-eval'", ""))
+    cell.evaluate(_RENDER.replace('import("/app.js")', "window.load()"), {**traits(), "withWasm": False})
+    cell.evaluate("new Promise(go => setTimeout(go, 100))")
+    assert cell.evaluate("widget.asked") == [{"kind": "ask", "id": 1, "request": {"kind": "describe"}}]
