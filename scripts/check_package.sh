@@ -4,7 +4,9 @@
 set -eu
 
 python=$1
-package=$2
+shift
+[ $# -eq 1 ] || { echo "one package is checked, and there are several: $*; remove those of earlier builds" >&2; exit 1; }
+package=$1
 [ -f "$package" ] || { echo "there is no package $package: make build-release, or make sdist" >&2; exit 1; }
 root=$(cd "$(dirname "$0")/.." && pwd)
 package=$(cd "$(dirname "$package")" && pwd)/$(basename "$package")
