@@ -23,6 +23,8 @@ MATURIN := env -u CONDA_PREFIX VIRTUAL_ENV="$(abspath $(VENV))" CARGO_ZIGBUILD_P
 # intersections, discrete states, the record, and runs that fail.
 FAST := $(patsubst %,tests/test_%.py,trace_branching trace_numpy wrong_input itinerary itinerary_exact order \
 	order_of_outcomes events resets sliding_rules classify laws structure adversarial failures)
+# The files of the tests are shared among as many processes as there are cores.
+PARALLEL ?= -n auto --dist loadfile
 # The binding has no Rust tests of its own: tests/ exercises it from Python.
 RUST_TESTED := --workspace --exclude filippov-py
 
@@ -86,7 +88,7 @@ test-rs: tools ## Rust tests
 	$(CARGO) test --release $(RUST_TESTED)
 
 test-py: $(BUILD_STAMP) ## Python tests and the examples in the docstrings, but for PyTorch's: it is not installed
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest $(PARALLEL) -m "not slow"
 	$(BIN)/pytest --doctest-modules python/filippov --ignore=python/filippov/autodiff/with_torch.py
 
 test-fast: $(BUILD_STAMP) ## Rust unit tests, and Python tests of every stage: half a minute once all is built

@@ -529,7 +529,8 @@ class Solution:
 
     def _hint_of_state(self, name: object) -> str:
         """Return how to read a state of that name; empty if there is none."""
-        return f"; write state({name!r}) for the state" if name in self.__dict__.get("states", ()) else ""
+        states = self._origin.states if hasattr(self, "_origin") else self.__dict__.get("states", ())
+        return f"; write state({name!r}) for the state" if name in states else ""
 
     def _fields(self) -> dict[str, Any]:
         """Return all fields by name, in their order, those made now that were not asked for yet."""

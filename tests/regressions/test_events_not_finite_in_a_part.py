@@ -71,6 +71,7 @@ def test_a_jump_through_zero_is_a_zero() -> None:
     assert sol.t_events[0] == pytest.approx([2 / 3], abs=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_a_called_function_that_ends_within_a_step() -> None:
     def event(t: float, x: Any) -> float:
         y = number(x[0])
@@ -80,6 +81,7 @@ def test_a_called_function_that_ends_within_a_step() -> None:
     assert sol.t_events[0] == pytest.approx([0.99], abs=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:events.*is sampled")
 def test_a_function_that_is_finite_at_single_points_only_ends() -> None:
     def event(t: float, x: Any) -> float:
         return math.nan if hash(number(t)) % 2 else 1.0
