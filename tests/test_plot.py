@@ -233,7 +233,7 @@ def test_a_surface_in_space_needs_axes_in_space() -> None:
         fl.plot.surface(parts, ax=flat)
 
 
-@pytest.mark.parametrize("size", [(4.0, 3.0), (6.4, 5.0), (10.0, 8.0)])
+@pytest.mark.parametrize("size", [(4.0, 3.0), (6.4, 3.6), (6.4, 5.0), (10.0, 8.0)])
 @pytest.mark.parametrize("view", [(30.0, -60.0), (60.0, -30.0), (30.0, -80.0)])
 def test_the_legend_in_space_touches_no_axis(size: tuple[float, float], view: tuple[float, float]) -> None:
     problem = fl.problems.get("relay_feedback_cycle")
@@ -244,6 +244,8 @@ def test_the_legend_in_space_touches_no_axis(size: tuple[float, float], view: tu
     figure.canvas.draw()
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     beside = ax.get_legend().get_window_extent(renderer)
+    letters = [text.get_window_extent(renderer).x1 for text in ax.get_legend().get_texts()]
+    assert max(letters) < figure.bbox.x1, "the whole legend is in the figure"
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         assert not axis.get_tightbbox(renderer).overlaps(beside), axis
 

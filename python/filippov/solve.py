@@ -338,7 +338,8 @@ def _keep_call(
         # What is warned of at every call is not kept.
         if prepared.doubts or any(isinstance(one, str) for one in traced):
             return
-        found: list[CoreEvent] = [(one, *spec[1:]) for one, spec in zip(traced, specs or [], strict=True)]
+        pairs = zip(traced, specs or [], strict=True)
+        found: list[CoreEvent] = [(one, *spec[1:]) for one, spec in pairs if not isinstance(one, str)]
         system._calls[key] = _Call(
             prepared,
             options,

@@ -139,6 +139,8 @@ def phase3d(
     ax.set_zlabel(label_of(shown.names[2], units))
     for axis in "xyz":  # seen from the side, more numbers than this run into one another
         ax.locator_params(axis=axis, nbins=4)
+    if ax.get_legend() is not None and ax.figure.get_layout_engine() is not None:
+        ax.figure.draw_without_rendering()  # a layout makes room for what stands beside a cube in two rounds
     return ax
 
 
