@@ -594,6 +594,32 @@ def test_a_diagram_over_a_reciprocal(open_page: Any) -> None:
     assert 1 / front(page, "state.params.omega") == pytest.approx(3.65, abs=0.2), "what stands there"
 
 
+def _to_a_wall(t: float, state: Any, omega: float = 1.5) -> Any:
+    x, v = state
+    return [v, -x - 0.1 * v + np.cos(omega * t)]
+
+
+def test_a_diagram_that_carries_its_state_stays_on_its_branch_until_it_grazes(open_page: Any) -> None:
+    wall = fl.Reset(lambda t, y: 1.0 - y[0], lambda t, y: [y[0], -0.8 * y[1]], direction="down")
+    system = fl.System(_to_a_wall, resets=wall, n=2)
+    model = make_page(system, y0=[0.0, 0.0], t_span=(0, 60)).to_bytes()
+    view = {
+        "section": {"by": "forcing", "frequency": "omega", "phase": 0},
+        "parameter": "omega",
+        "carry": True,
+    }
+    view |= {"range": [1.7, 1.35], "skip": 60, "count": 1, "place": "diagram"}
+    page = open_page(f"#m={packed(bytes(model))}&s={packed(json.dumps(view).encode())}")
+    settle(page)
+    omega, x = (np.array(front(page, f"panels.get('diagram').points.{name}.slice()")) for name in "xy")
+    order = np.argsort(-omega)
+    jump = int(np.argmax(np.abs(np.diff(x[order]))))
+    # The amplitude of the motion without impacts is 1 there: (1 - omega^2)^2 + (0.1 omega)^2 = 1.
+    before, after = omega[order][jump : jump + 2]
+    assert after < np.sqrt(1.99) < before + 1e-3
+    assert before - after < 1e-3
+
+
 def test_a_page_without_the_reader_shows_the_text_and_says_so(open_page: Any) -> None:
     script = """const get = window.fetch;
     window.fetch = (a, ...b) => String(a).includes("_text") ? Promise.reject(new Error()) : get(a, ...b);"""

@@ -28,6 +28,9 @@ import { chunks, coarseToFine, evenly } from "./sweep.ts";
 const [FEWEST_VALUES, MOST_VALUES] = [200, 960];
 const CHUNK = 6;
 
+/** Where a run begins. */
+type Start = NonNullable<ReturnType<typeof toDiagramPart>["end"]>;
+
 /** A part of the plane of the diagram: of what stands on the axes. */
 interface Window {
   readonly range: readonly [number, number];
@@ -187,7 +190,7 @@ export class DiagramPanel extends WorkPanel {
   /** Values in any order, in as many workers as there are. */
   private async scattered(signal: AbortSignal): Promise<void> {
     const values = coarseToFine(this.values());
-    const requests = chunks(values, CHUNK).map((part) => this.request(part, this.context.state.y0));
+    const requests = chunks(values, CHUNK).map((part) => this.request(part));
     await askAll(
       this.context.engines.many(),
       requests,
@@ -199,12 +202,12 @@ export class DiagramPanel extends WorkPanel {
   /** Values in their order, each from the end of the last. */
   private async carried(signal: AbortSignal): Promise<void> {
     const { state, engines } = this.context;
-    let start = [...state.y0];
+    let start: Start = { t: state.t_span[0], y: state.y0 };
     for (const part of chunks(this.values(), CHUNK)) {
       const request = this.request(part, start);
       const found = toDiagramPart(await engines.many()[0].ask(request, signal));
       signal.throwIfAborted();
-      if (found.end && found.end.every(Number.isFinite)) start = [...found.end];
+      start = found.end ?? start;
       this.take(found, request);
     }
   }
@@ -226,13 +229,15 @@ export class DiagramPanel extends WorkPanel {
     return evenly(this.range(), this.total).map((value) => this.onAxis(value));
   }
 
-  private request(values: readonly number[], y0: readonly number[]): Request {
+  private request(values: readonly number[], start?: Start): Request {
     const { state } = this.context;
+    const [from, to] = longSpan(state);
+    const { t, y } = start ?? { t: from, y: state.y0 };
     return {
       kind: "diagram",
       ...motionRequest(state),
-      y0,
-      t_span: longSpan(state),
+      y0: y,
+      t_span: [t, t + to - from],
       section: sweptSection(state.section!, state.params, state.parameter!, values),
       skip: state.skip,
       count: state.count,

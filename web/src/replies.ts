@@ -83,7 +83,7 @@ export interface Returns {
 export interface DiagramPart {
   readonly value: Float64Array;
   readonly y: Float64Array;
-  readonly end: readonly number[] | null;
+  readonly end: { readonly t: number; readonly y: readonly number[] } | null;
   readonly failures: readonly { readonly value: number; readonly message: string }[];
 }
 
@@ -168,7 +168,7 @@ export function toDiagramPart(reply: Reply): DiagramPart {
   return {
     value: reply.table("value").data,
     y: reply.table("y").data,
-    end: reply.has("end") ? [...reply.table("end").data] : null,
+    end: reply.has("end") ? { t: Number(reply.header.t), y: [...reply.table("end").data] } : null,
     failures: (reply.header.messages ?? []) as DiagramPart["failures"],
   };
 }

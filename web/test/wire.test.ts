@@ -80,11 +80,11 @@ test("planes, diagrams and basins", () => {
   assert.equal(plane.parts[0].kind, "attracting");
   assert.deepEqual(plane.equilibria, []);
   assert.equal(plane.instant, 7, "a field that depends on the time has its time");
-  const header = { ok: true, messages: [{ value: 2, message: "too many steps" }] };
+  const header = { ok: true, t: 5, messages: [{ value: 2, message: "too many steps" }] };
   const part = toDiagramPart(
     readReply(packReply(header, { value: column([1, 1]), y: column([3, 4]), end: column([3, 4]) })),
   );
-  assert.deepEqual(part.end, [3, 4]);
+  assert.deepEqual(part.end, { t: 5, y: [3, 4] });
   assert.equal(part.failures[0].message, "too many steps");
   const basins = toBasins(
     readReply(

@@ -81,6 +81,11 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         }
     }
     let mut reply = Reply::new("diagram");
+    if carries {
+        // Where a request for further values begins.
+        reply.set("t", t_start);
+        reply.array("end", &[start.len()], &start);
+    }
     reply.set("done", statuses.len());
     reply.set("status", statuses);
     reply.set("messages", messages);

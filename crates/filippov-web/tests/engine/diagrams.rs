@@ -83,6 +83,28 @@ fn a_diagram_carries_its_state_on() {
 }
 
 #[test]
+fn the_next_request_goes_on_where_the_last_one_ended() {
+    let model = oscillator();
+    let diagram = |section: &str, from: f64, start: &[f64], values: &[f64]| {
+        let until = from + 200.0;
+        let request = format!(
+            r#"{{"kind": "diagram", "section": {section}, "count": 2, "t_span": [{from}, {until}], "y0": {start:?},
+                "parameter": "F", "values": {values:?}, "coordinate": 0, "carry": true}}"#
+        );
+        ask(&model, &request)
+    };
+    for section in [&format!(r#"{{"period": {PERIOD}}}"#), r#"{"surface": "v"}"#] {
+        let whole = diagram(section, 0.0, &[1.0, 2.0], &[0.4, 0.3, 0.2]);
+        let first = diagram(section, 0.0, &[1.0, 2.0], &[0.4, 0.3]);
+        let t = first.header["t"].as_f64().unwrap();
+        let second = diagram(section, t, first.array("end"), &[0.2]);
+        assert_eq!(whole.array("y")[..4], *first.array("y"));
+        assert_eq!(whole.array("y")[4..], *second.array("y"));
+        assert_eq!(whole.array("end"), second.array("end"));
+    }
+}
+
+#[test]
 fn a_value_that_fails_is_a_gap_with_its_reason() {
     let request = format!(
         r#"{{"kind": "diagram", "section": {{"period": {PERIOD}}}, "count": 2, "max_steps": 3,
