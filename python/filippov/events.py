@@ -99,8 +99,8 @@ def normalise_events(events: Any) -> list[EventSpec] | None:
     if events is None:
         return None
     if callable(events) or isinstance(events, Event):
-        events = [events]
-    if not isinstance(events, Iterable):
+        events = (events,)
+    elif not isinstance(events, Iterable):
         raise InputError(f"events: functions g(t, y) are needed, not {type(events).__name__}")
     specs: list[EventSpec] = []
     for entry in events:

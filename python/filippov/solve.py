@@ -298,10 +298,19 @@ def solve_quietly(
 
 def _key_of(options: Mapping[str, Any], specs: list[EventSpec] | None) -> Hashable | None:
     """Return what tells these options and events from others, if that is known."""
-    if specs is not None:
-        read = [(fingerprint(spec.g), *spec[1:]) for spec in specs]
-        key = _key_of(options, None)
-        return None if key is None or any(one[0] is None for one in read) else (key, *read)
+    key = _key_of_options(options)
+    if specs is None or key is None:
+        return key
+    parts = [key]
+    for g, direction, terminal, name in specs:
+        read = fingerprint(g)
+        if read is None:
+            return None
+        parts.append((read, direction, terminal, name))
+    return tuple(parts)
+
+
+def _key_of_options(options: Mapping[str, Any]) -> Hashable | None:
     if "wrt" not in options:
         return repeatable_key(options)
     others = dict(options)
@@ -336,10 +345,13 @@ def _keep_call(
         prepared = system.prepare(n, 0.0, None, values)
         prepared, traced = traced_events(specs or [], system, prepared, 0.0, y0, (), values)
         # What is warned of at every call is not kept.
-        if prepared.doubts or any(isinstance(one, str) for one in traced):
+        found: list[CoreEvent] = [
+            (one, *spec[1:])
+            for one, spec in zip(traced, specs or [], strict=True)
+            if not isinstance(one, str)
+        ]
+        if prepared.doubts or len(found) < len(traced):
             return
-        pairs = zip(traced, specs or [], strict=True)
-        found: list[CoreEvent] = [(one, *spec[1:]) for one, spec in pairs if not isinstance(one, str)]
         system._calls[key] = _Call(
             prepared,
             options,

@@ -46,6 +46,14 @@ pub struct Multiple {
 }
 
 impl Found {
+    /// The surfaces whose switching functions vanish.
+    pub fn surfaces(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.guards.iter().filter_map(|guard| match guard {
+            Guard::Surface(j) => Some(*j),
+            _ => None,
+        })
+    }
+
     /// Guards that vanish at the start of the step.
     pub fn here(guards: SmallVec<[Guard; 2]>) -> Self {
         Found {

@@ -28,7 +28,7 @@ pub(crate) enum StepEnd {
 /// The user's functions and their zeros so far.
 pub(crate) struct UserEvents<'a> {
     pub events: &'a [UserEvent<'a>],
-    /// Value at the start of the step, per event.
+    /// Value at the start of the step, per event; NaN if it is not known.
     pub left: Vec<f64>,
     /// Value at the start of the step before, per event.
     pub before: Vec<f64>,

@@ -23,7 +23,7 @@ use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::{Progress, Reached};
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::{Guard, Run, Slacks, SmoothField};
+use crate::motion::{Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
@@ -396,19 +396,16 @@ impl<'a> Integrator<'a> {
     #[cold]
     fn end_of_step(&self, found: Option<&Found>, t_stop: f64) -> StepEnd {
         let triggers = self.run.motion.triggers(self.run.system);
-        let guards = || found.iter().flat_map(|event| &event.guards);
         let is_tick = t_stop >= self.horizon && self.horizon < self.t_end;
         let mut timed = self.run.actions.list.iter().filter(|action| {
             is_tick && !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump)
         });
-        let moves_state = guards().any(|guard| match guard {
-            Guard::Surface(j) => triggers.at(*j).any(|action| action.map.moves_state()),
-            _ => true,
-        }) || timed.any(|action| action.map.moves_state());
-        let follows_law =
-            |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.follows_law(*j));
+        let mut surfaces = found.iter().flat_map(|event| event.surfaces());
+        let jumps = |j| triggers.at(j).any(|action| action.map.moves_state());
+        let moves_state =
+            surfaces.clone().any(jumps) || timed.any(|action| action.map.moves_state());
         match () {
-            () if guards().any(follows_law) => StepEnd::Law,
+            () if surfaces.any(|j| triggers.follows_law(j)) => StepEnd::Law,
             () if moves_state || t_stop >= self.t_end => StepEnd::Stops,
             () if is_tick => StepEnd::Law,
             () => StepEnd::GoesOn,

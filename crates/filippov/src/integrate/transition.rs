@@ -258,11 +258,7 @@ impl<'a> Integrator<'a> {
             return self.jump_to(limit, mode);
         }
         if surfaces.is_empty() {
-            let named = event.guards.iter().filter_map(|f| match f {
-                Guard::Surface(j) => Some(*j),
-                _ => None,
-            });
-            surfaces.extend(named);
+            surfaces.extend(event.surfaces());
         }
         Ok(Some(Stop::NoProgress { surfaces }))
     }

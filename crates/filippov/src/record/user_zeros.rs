@@ -5,7 +5,7 @@ use filippov_expr::sort_few;
 use super::Recorder;
 use crate::error::FieldError;
 use crate::event::search::StepSearch;
-use crate::event::TICK;
+use crate::event::{StepEnd, TICK};
 use crate::status::Stop;
 
 impl Recorder<'_> {
@@ -74,9 +74,14 @@ impl Recorder<'_> {
         let events = &mut self.user_events;
         events.at_start = false;
         events.accept_sides();
+        // Where the motion ends, the next one evaluates the functions anew.
+        let is_needed = theta == 1.0 || events.end == StepEnd::Stops;
         for k in 0..events.events.len() {
             events.before[k] = events.left[k];
-            events.left[k] = search.user_value(events.events[k].function, theta)?;
+            events.left[k] = match is_needed {
+                true => search.user_value(events.events[k].function, theta)?,
+                false => f64::NAN,
+            };
         }
         Ok(None)
     }

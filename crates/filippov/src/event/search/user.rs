@@ -167,7 +167,11 @@ impl StepSearch<'_, '_> {
     ) -> Result<Option<Vec<Change>>, FieldError> {
         let function = events.events[index].function;
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-        let left = events.left[index];
+        // It is not known where a motion went on from within a step.
+        let left = match events.left[index] {
+            value if value.is_nan() => self.user_value(function, 0.0)?,
+            value => value,
+        };
         let was_zero = (events.last[index] - t0).abs() <= self.together(dt) * dt;
         let mut start = AtStart {
             before: side(left),

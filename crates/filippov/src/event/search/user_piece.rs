@@ -112,20 +112,24 @@ fn zeros_of_series(rows: &[f64], search: &StepSearch, start: Start, to: f64) -> 
     let rows = &rows[divided..];
     let others: f64 = rows[1..].iter().map(|c| c.abs()).sum();
     let size = others + rows[0].abs();
-    if start.from == 0.0 && rows[0].abs() > others + ROUNDING * size {
-        let sign = rows[0].signum();
-        return (divided == 1 || sign == start.sign).then_some((sign, SmallVec::new()));
+    let (left, noise) = (rows[0].signum(), ROUNDING * size);
+    let is_first = start.from == 0.0 && (divided == 1 || left == start.sign);
+    let series = Series::new(rows);
+    let is_clear = || rows[0].abs() > others + noise;
+    let stays = || left * series.ends()[1] > 0.0 && series.has_sign(left, noise);
+    if is_first && (is_clear() || stays()) {
+        return Some((left, SmallVec::new()));
     }
     let interpolant = search.stepper.interpolant();
     let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
     let beside = 4.0 * search.together(interpolant.dt);
-    let mut zeros = Series::new(rows).all_zeros(ROUNDING * size, width)?;
+    let mut zeros = series.all_zeros(noise, width)?;
     let count = |is_there: &dyn Fn(f64) -> bool| zeros.iter().filter(|&&at| is_there(at)).count();
     let n_before = count(&|at| at <= start.from + beside);
     let n_at_start = count(&|at| (at - start.from).abs() <= beside);
     let n_at_end = count(&|at| (at - to).abs() <= beside);
     let turns = if n_before % 2 == 0 { 1.0 } else { -1.0 };
-    let sign = turns * rows[0].signum();
+    let sign = turns * left;
     // A zero at the end needs a closer look.
     let is_clear = n_at_start == usize::from(start.divided) - divided
         && n_at_end == 0
