@@ -23,6 +23,12 @@ def test_seven_surfaces_between_which_functions_jump_are_not_passed_to_a_wrong_s
     assert check(1068586).kind != "different"
 
 
+@pytest.mark.parametrize("seed", [6007839, 6046559, 6058142, 6069713, 6073801, 6089025, 6090752])
+def test_what_stays_as_it_is_has_the_sign_of_python_as_a_part_of_an_expression_too(seed: int) -> None:
+    """One of several parts is a constant of motion, or the number that is left of ``x + 0.25 - x``."""
+    assert check(seed).kind == "same"
+
+
 @pytest.mark.parametrize("first", range(0, 300, 100))
 def test_nested_functions_as_events_lose_no_zero_and_invent_none(first: int) -> None:
     seeds = [*range(first, first + 100), *([11447, 14608, 15561] if first == 0 else [])]

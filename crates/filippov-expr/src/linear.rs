@@ -66,6 +66,14 @@ impl Accumulated {
     }
 }
 
+impl Graph {
+    /// The number that an expression is for all values of what it is made of, as 0.25 is `x + 0.25 - x`; else `None`.
+    pub fn as_number(&self, id: NodeId) -> Option<f64> {
+        let form = LinearForm::of(self, id);
+        form.terms.is_empty().then_some(form.constant)
+    }
+}
+
 impl LinearForm {
     /// The linear form of an expression, at a cost linear in its size (shared parts are visited once).
     pub fn of(graph: &Graph, root: NodeId) -> Self {

@@ -164,6 +164,12 @@ impl Builder {
         Ok(graph.as_constant(Self::node(&graph, a)?))
     }
 
+    /// The number that an expression is for all values of what it is made of: see `Graph::as_number`.
+    fn as_number(&self, a: u32) -> PyResult<Option<f64>> {
+        let graph = self.graph();
+        Ok(graph.as_number(Self::node(&graph, a)?))
+    }
+
     fn depends_on_motion(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         Ok(graph.depends_on_motion(Self::node(&graph, a)?))

@@ -42,7 +42,7 @@ MOST_AFTER_MANY = 32
 MANY = 3
 
 # An expression that jumps is taken apart into that many parts at most: a limiter of a limiter has a dozen.
-MOST_JUMPING_PARTS = 32
+MOST_JUMPING_PARTS = 64
 
 
 @dataclass(frozen=True)
@@ -335,7 +335,7 @@ class Tracer:
         It is that of constants and parameters; or it follows in each region from the whole numbers around
         what a floor is taken of, as of ``x - np.floor(x)``.
         """
-        known = self.known_sign(node) if self.parameters else None
+        known = self.known_sign(node)
         if known is None and self.laws.names and self.builder.has_signs(node):
             self.pieces(node)
             known = self._signs.get(node)
@@ -396,23 +396,27 @@ class Tracer:
             if is_whole and pieces is not None and isinstance(pieces[1], float):
                 self._signs[node] = pieces[1]
             if is_whole and not in_full and self.may_slide:
-                pieces = self._jumping_parts(node)
+                pieces = self._parts_apart(node)
                 is_whole = pieces is None
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
 
-    def _jumping_parts(self, node: int) -> Pieces | None:
-        """Return the parts of an expression that jumps with a sign inside of it: each switches where it does.
+    def _parts_apart(self, node: int) -> Pieces | None:
+        """Return the parts of an expression that jumps with a sign in it, or has a constant of motion as one.
 
-        So a motion slides where the inner sign changes between the fields that there are on its two sides:
-        ``np.sign(x + np.sign(y))`` is ``np.where(y > 0, np.sign(x + 1), np.sign(x - 1))``.
+        Each switches where it does. So a motion slides where the inner sign changes between the fields that
+        there are on its two sides: ``np.sign(x + np.sign(y))`` is ``np.where(y > 0, np.sign(x + 1),
+        np.sign(x - 1))``. And what stays as it is has the sign that Python gives it.
         """
         if self.laws.reads_any(self, node):
             return None
         known = (self.values.tolist(), self.laws.discrete())
         parts, for_these_values = self.builder.pieces(node, *known, MOST_JUMPING_PARTS, True)
         # To ask whether it jumps takes long, where there are many signs.
-        return None if parts is None or for_these_values or not self.jumps(node) else parts
+        if parts is None or for_these_values:
+            return None
+        stays = any(self.is_constant_of_motion(part) for part, sign in parts_of(parts) if sign is None)
+        return parts if stays or self.jumps(node) else None
 
     def take_as_whole(self, node: int) -> None:
         """Leave an expression in one piece: where it would stand still, it is not asked for."""
@@ -506,7 +510,7 @@ class Tracer:
         if value is None:
             return None
         sign = float(np.sign(value))
-        if self.builder.as_constant(node) is None:
+        if self.builder.as_number(node) is None:
             self.guards.setdefault(node, Guard(self.text(node), sign))
         return sign
 
@@ -520,9 +524,9 @@ class Tracer:
 
     def known_value(self, node: int) -> float | None:
         """Return the value of an expression of constants and parameters; None if it changes in a run."""
-        constant = self.builder.as_constant(node)
-        if constant is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
-            return constant
+        number = self.builder.as_number(node)
+        if number is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
+            return number
         system = TracedSystem(self.builder, [node] * self.n_states, self.n_states, self.names(), self.states)
         signs = np.ones(self.builder.n_surfaces())
         return float(system.field(self.t0, self.y0, signs, self.values)[0])
