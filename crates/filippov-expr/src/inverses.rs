@@ -143,7 +143,7 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
     };
     rest.terms.remove(term.place);
     rest.terms.iter_mut().for_each(|term| term.1 /= coefficient);
-    let sum = sum_of(graph, &rest);
+    let sum = rest.expression(graph);
     let inverse = match term.inverse {
         Inverse::Cube => match power_of_root(graph, &rest, 3.0) {
             Some(power) => power,
@@ -238,17 +238,6 @@ fn odd_power(graph: &mut Graph, form: &LinearForm, c: NodeId, p: f64) -> Option<
         }
         _ => None,
     }
-}
-
-/// The expression of a linear form.
-fn sum_of(graph: &mut Graph, form: &LinearForm) -> NodeId {
-    let mut sum = graph.constant(form.constant);
-    for &(atom, coefficient) in &form.terms {
-        let factor = graph.constant(coefficient);
-        let term = graph.mul(factor, atom);
-        sum = graph.add(sum, term);
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -67,10 +67,13 @@ impl Accumulated {
 }
 
 impl Graph {
-    /// The number that an expression is for all values of what it is made of, as 0.25 is `x + 0.25 - x`; else `None`.
-    pub fn as_number(&self, id: NodeId) -> Option<f64> {
-        let form = LinearForm::of(self, id);
-        form.terms.is_empty().then_some(form.constant)
+    /// An expression without the terms that cancel in it: 0.25 for `x + 0.25 - x`.
+    pub fn without_cancelled(&mut self, id: NodeId) -> NodeId {
+        let (form, cancels) = LinearForm::collected(self, &[(id, 1.0)], 0.0);
+        match cancels {
+            true => form.expression(self),
+            false => id,
+        }
     }
 }
 
@@ -82,6 +85,11 @@ impl LinearForm {
 
     /// That of a sum of multiples of expressions and of a number.
     pub fn of_sum(graph: &Graph, roots: &[(NodeId, f64)], number: f64) -> Self {
+        Self::collected(graph, roots, number).0
+    }
+
+    /// The same, and whether some of its terms cancelled.
+    fn collected(graph: &Graph, roots: &[(NodeId, f64)], number: f64) -> (Self, bool) {
         let mut coefficients: FxHashMap<NodeId, Accumulated> = FxHashMap::default();
         let mut pending = BinaryHeap::new();
         for &(root, coefficient) in roots {
@@ -91,6 +99,7 @@ impl LinearForm {
         let mut terms = Vec::new();
         let mut constant = Accumulated::default();
         constant.add(number);
+        let mut cancels = false;
         // Largest number first: when a node is taken, everything that uses it has been taken.
         while let Some(id) = pending.pop() {
             let Some(sum) = coefficients.remove(&id) else {
@@ -98,6 +107,7 @@ impl LinearForm {
             };
             let c = sum.rounded();
             if c == 0.0 {
+                cancels = true;
                 continue;
             }
             let mut push = |operand: NodeId, coefficient: f64| {
@@ -134,14 +144,27 @@ impl LinearForm {
             terms,
             constant: constant.rounded(),
         };
-        if form.is_finite() {
-            form
-        } else {
-            LinearForm {
-                terms: roots.to_vec(),
-                constant: number,
+        match form.is_finite() {
+            true => (form, cancels),
+            false => {
+                let form = LinearForm {
+                    terms: roots.to_vec(),
+                    constant: number,
+                };
+                (form, false)
             }
         }
+    }
+
+    /// The expression of the form.
+    pub fn expression(&self, graph: &mut Graph) -> NodeId {
+        let mut sum = graph.constant(self.constant);
+        for &(atom, coefficient) in &self.terms {
+            let factor = graph.constant(coefficient);
+            let term = graph.mul(factor, atom);
+            sum = graph.add(sum, term);
+        }
+        sum
     }
 
     /// Whether nothing is left of it.

@@ -81,6 +81,13 @@ impl Builder {
         Ok(roots::apply_to_two(&mut graph, op, a, b).0)
     }
 
+    /// An expression without the terms that cancel in it: see `Graph::without_cancelled`.
+    fn without_cancelled(&self, a: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.without_cancelled(a).0)
+    }
+
     fn sign(&self, a: u32) -> PyResult<u32> {
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;
@@ -162,12 +169,6 @@ impl Builder {
     fn as_constant(&self, a: u32) -> PyResult<Option<f64>> {
         let graph = self.graph();
         Ok(graph.as_constant(Self::node(&graph, a)?))
-    }
-
-    /// The number that an expression is for all values of what it is made of: see `Graph::as_number`.
-    fn as_number(&self, a: u32) -> PyResult<Option<f64>> {
-        let graph = self.graph();
-        Ok(graph.as_number(Self::node(&graph, a)?))
     }
 
     fn depends_on_motion(&self, a: u32) -> PyResult<bool> {

@@ -42,7 +42,7 @@ MOST_AFTER_MANY = 32
 MANY = 3
 
 # An expression that jumps is taken apart into that many parts at most: a limiter of a limiter has a dozen.
-MOST_JUMPING_PARTS = 64
+MOST_JUMPING_PARTS = 128
 
 
 @dataclass(frozen=True)
@@ -255,6 +255,7 @@ class Tracer:
 
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
+        node = self.builder.without_cancelled(node)
         known = self.sign_everywhere(node)
         if known is not None:
             return self.builder.constant(known)
@@ -280,6 +281,7 @@ class Tracer:
 
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""
+        node = self.builder.without_cancelled(node)
         known = self.sign_everywhere(node)
         if known is not None:
             return node if known >= 0.0 else self.builder.unary("negative", node)
@@ -292,7 +294,7 @@ class Tracer:
 
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
-        difference = self.builder.binary("subtract", first, second)
+        difference = self.builder.without_cancelled(self.builder.binary("subtract", first, second))
         known = self.sign_everywhere(difference)
         if known is not None:
             return first if (known >= 0.0) == largest else second
@@ -309,6 +311,7 @@ class Tracer:
 
     def compare(self, node: int, *, strict: bool) -> Condition | bool:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
+        node = self.builder.without_cancelled(node)
         known = self.sign_everywhere(node)
         if known is None:
             if self.is_constant_of_motion(node):
@@ -335,7 +338,7 @@ class Tracer:
         It is that of constants and parameters; or it follows in each region from the whole numbers around
         what a floor is taken of, as of ``x - np.floor(x)``.
         """
-        known = self.known_sign(node)
+        known = self.known_sign(node) if self.parameters else None
         if known is None and self.laws.names and self.builder.has_signs(node):
             self.pieces(node)
             known = self._signs.get(node)
@@ -344,6 +347,7 @@ class Tracer:
 
     def equal(self, node: int) -> Condition | bool | None:
         """Return the condition ``expression == 0``; None if that is so at single points only."""
+        node = self.builder.without_cancelled(node)
         known = self.known_sign(node)
         if known is not None:
             return known == 0.0
@@ -408,15 +412,13 @@ class Tracer:
         there are on its two sides: ``np.sign(x + np.sign(y))`` is ``np.where(y > 0, np.sign(x + 1),
         np.sign(x - 1))``. And what stays as it is has the sign that Python gives it.
         """
-        if self.laws.reads_any(self, node):
-            return None
         known = (self.values.tolist(), self.laws.discrete())
         parts, for_these_values = self.builder.pieces(node, *known, MOST_JUMPING_PARTS, True)
-        # To ask whether it jumps takes long, where there are many signs.
         if parts is None or for_these_values:
             return None
         stays = any(self.is_constant_of_motion(part) for part, sign in parts_of(parts) if sign is None)
-        return parts if stays or self.jumps(node) else None
+        # To ask whether it jumps takes long, where there are many signs.
+        return parts if stays or (not self.laws.reads_any(self, node) and self.jumps(node)) else None
 
     def take_as_whole(self, node: int) -> None:
         """Leave an expression in one piece: where it would stand still, it is not asked for."""
@@ -510,7 +512,7 @@ class Tracer:
         if value is None:
             return None
         sign = float(np.sign(value))
-        if self.builder.as_number(node) is None:
+        if self.builder.as_constant(node) is None:
             self.guards.setdefault(node, Guard(self.text(node), sign))
         return sign
 
@@ -524,9 +526,9 @@ class Tracer:
 
     def known_value(self, node: int) -> float | None:
         """Return the value of an expression of constants and parameters; None if it changes in a run."""
-        number = self.builder.as_number(node)
-        if number is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
-            return number
+        constant = self.builder.as_constant(node)
+        if constant is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
+            return constant
         system = TracedSystem(self.builder, [node] * self.n_states, self.n_states, self.names(), self.states)
         signs = np.ones(self.builder.n_surfaces())
         return float(system.field(self.t0, self.y0, signs, self.values)[0])

@@ -8,7 +8,7 @@ use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
 use crate::tolerances::{EPS, REST_BESIDE, SAME_VALUE, SMALL_REST};
 
-pub use super::bernstein::{FirstZero, NO_TERMS};
+pub use super::bernstein::{FirstZero, LongestSeries, NO_TERMS};
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
 const GUESS_SAMPLES: u32 = 3;
@@ -93,20 +93,13 @@ impl<'a> Series<'a> {
         let mut coefficients = NO_TERMS;
         let b = &mut coefficients[..first.used];
         to_bernstein(self.0, b);
-        let mut falling = NO_TERMS;
-        let falling = &mut falling[..self.0.len()];
-        falling.copy_from_slice(self.0);
-        // Positive where the search begins, and behind each zero turned to be so again.
-        let turn = |falling: &mut [f64]| falling.iter_mut().for_each(|c| *c = -*c);
-        if self.0[0] < 0.0 {
-            turn(falling);
-        }
         let (mut zeros, mut is_single) = (SmallVec::new(), true);
+        let mut sign = self.0[0].signum();
         let mut add = |between, guess| {
-            let (zero, slope) = Series(falling).only_zero(between, guess, width);
+            let (zero, slope) = self.only_zero(sign, between, guess, width);
             is_single &= self.is_single(slope, first.rest);
             zeros.push(zero);
-            turn(falling);
+            sign = -sign;
         };
         let is_told = each_zero_between(b, (0.0, 1.0), noise + first.rest, HALVINGS, &mut add);
         (is_told && is_single).then_some(zeros)
@@ -212,9 +205,16 @@ impl<'a> Series<'a> {
         (value, slope)
     }
 
-    /// The only zero between two points, where the polynomial falls, within `width` of it; and the slope there. By
-    /// Halley's method from a guess, kept in the bracket: an error e becomes one of order e^3.
-    pub fn only_zero(&self, (mut lo, mut hi): (f64, f64), guess: f64, width: f64) -> (f64, f64) {
+    /// The only zero between two points, before which the polynomial has this sign and behind it the other one, within
+    /// `width` of it; and the slope there. By Halley's method from a guess, kept in the bracket: an error e becomes one of
+    /// order e^3.
+    pub fn only_zero(
+        &self,
+        sign: f64,
+        (mut lo, mut hi): (f64, f64),
+        guess: f64,
+        width: f64,
+    ) -> (f64, f64) {
         let (mut at, length) = (guess.clamp(lo, hi), hi - lo);
         let (mut slope, mut before) = (f64::NAN, f64::INFINITY);
         for _ in 0..ZERO_STEPS {
@@ -223,7 +223,7 @@ impl<'a> Series<'a> {
             if value == 0.0 {
                 break;
             }
-            if value > 0.0 {
+            if sign * value > 0.0 {
                 lo = at;
             } else {
                 hi = at;
@@ -450,7 +450,7 @@ mod tests {
             else {
                 continue;
             };
-            let (zero, slope) = series.only_zero((lo, hi), guess, 1e-15);
+            let (zero, slope) = series.only_zero(1.0, (lo, hi), guess, 1e-15);
             if !series.is_single(slope, rest) {
                 n_doubted += 1;
                 continue;
@@ -471,12 +471,12 @@ mod tests {
         // (1 - theta/r) (1 + theta^2), its factor also to the third power, and a wave around its bend.
         for root in [1e-3, 0.2, 0.5, 0.999] {
             let simple = [1.0, -1.0 / root, 1.0, -1.0 / root];
-            let (zero, slope) = Series::new(&simple).only_zero((0.0, 1.0), 0.7, 1e-16);
+            let (zero, slope) = Series::new(&simple).only_zero(1.0, (0.0, 1.0), 0.7, 1e-16);
             assert!((zero - root).abs() < 1e-15 && slope < 0.0);
             let triple = [1.0, -3.0 / root, 3.0 / (root * root), -1.0 / root.powi(3)];
-            let (zero, _) = Series::new(&triple).only_zero((0.0, 1.0), 0.7, 1e-16);
+            let (zero, _) = Series::new(&triple).only_zero(1.0, (0.0, 1.0), 0.7, 1e-16);
             assert!((zero - root).abs() < 1e-4);
-            let (zero, _) = Series::new(&triple).only_zero((0.0, 1.0), root, 1e-16);
+            let (zero, _) = Series::new(&triple).only_zero(1.0, (0.0, 1.0), root, 1e-16);
             assert!((zero - root).abs() < 1e-4);
         }
         let mut wave = [0.0; 24];
@@ -486,7 +486,7 @@ mod tests {
             *c = [term, 0.0, -term, 0.0][k % 4];
             term *= 3.0 / (k + 1) as f64;
         }
-        let (zero, slope) = Series::new(&wave).only_zero((0.0, 1.0), 0.3, 1e-16);
+        let (zero, slope) = Series::new(&wave).only_zero(1.0, (0.0, 1.0), 0.3, 1e-16);
         assert!((zero - std::f64::consts::FRAC_PI_6).abs() < 1e-15 && (slope + 3.0).abs() < 1e-9);
     }
 

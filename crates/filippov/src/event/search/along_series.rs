@@ -189,7 +189,7 @@ impl StepSearch<'_, '_> {
         }
         let (dt, n_rows) = (self.stepper.interpolant().dt, self.n_rows() as f64);
         let width = 0.5 * EPS * (self.run.t.abs() / dt).max(1.0);
-        let (mut theta, mut slope) = series.only_zero((lo, hi), guess, width);
+        let (mut theta, mut slope) = series.only_zero(1.0, (lo, hi), guess, width);
         if rest > 0.0 && !series.is_single(slope, rest) {
             return Ok(None);
         }

@@ -8,7 +8,7 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::series::{Series, NO_TERMS};
+use crate::event::series::{LongestSeries, Series, NO_TERMS};
 use crate::event::tube::Tube;
 use crate::event::{SmoothParts, UserFunction};
 use crate::locate::refine;
@@ -69,13 +69,15 @@ pub(super) enum Source<'f> {
     Part(&'f dyn SmoothParts, usize),
 }
 
-/// A part that is affine is a polynomial along the step, unless the motion is drawn back to a curved surface.
+/// A part that is affine is a polynomial along the step, unless the motion is drawn back to a curved surface; its coefficients
+/// go into `series`, and how many they are is returned.
 fn affine_series(
     parts: &dyn SmoothParts,
     part: usize,
     search: &mut StepSearch,
     start: impl FnOnce(&mut StepSearch) -> Result<f64, FieldError>,
-) -> Option<SmallVec<[f64; 32]>> {
+    series: &mut LongestSeries,
+) -> Option<usize> {
     let affine = parts
         .affine(part)
         .filter(|_| search.run.motion.is_straight)?;
@@ -83,23 +85,22 @@ fn affine_series(
     let interpolant = search.stepper.interpolant();
     let (n, rows) = (interpolant.n_states(), interpolant.coefficients());
     let n_terms = rows.len() / n;
-    if n_terms < 2 || n_terms > NO_TERMS.len() {
+    if n_terms < 2 || n_terms > series.len() {
         return None;
     }
-    let mut series: SmallVec<[f64; 32]> = SmallVec::from_elem(0.0, n_terms);
     for &(i, slope) in &affine.slopes {
-        let column = rows[i as usize..].iter().step_by(n);
-        series
-            .iter_mut()
-            .zip(column)
-            .for_each(|(term, c)| *term += slope * c);
+        let mut at = i as usize;
+        for term in &mut series[..n_terms] {
+            *term += slope * rows[at];
+            at += n;
+        }
     }
     series[0] = start;
     series[1] += affine.of_time * interpolant.dt;
     if interpolant.basis() == Basis::Nested {
-        powers_of_nested(&mut series);
+        powers_of_nested(&mut series[..n_terms]);
     }
-    Some(series)
+    Some(n_terms)
 }
 
 /// What a series tells of a piece of a step: the sign behind its start, and the zeros.
@@ -157,7 +158,10 @@ impl<'f> Along<'f> {
             y: RefCell::new(smallvec![0.0; search.run.x.len()]),
         };
         if let Source::Part(parts, part) = source {
-            along.series = affine_series(parts, part, search, |search| along.value(search, 0.0));
+            let mut series = NO_TERMS;
+            let start = |search: &mut StepSearch| along.value(search, 0.0);
+            let n_terms = affine_series(parts, part, search, start, &mut series);
+            along.series = n_terms.map(|n| SmallVec::from_slice(&series[..n]));
         }
         along
     }
@@ -262,8 +266,9 @@ impl StepSearch<'_, '_> {
         start: Start,
         to: f64,
     ) -> Option<Told> {
-        let rows = affine_series(parts, parts.n_inner(), self, |_| Ok(value))?;
-        zeros_of_series(&rows, self, start, to)
+        let mut series = NO_TERMS;
+        let n_terms = affine_series(parts, parts.n_inner(), self, |_| Ok(value), &mut series)?;
+        zeros_of_series(&series[..n_terms], self, start, to)
     }
 
     /// The first zero up to `to`, which `is_last` says to be the end of the search.
