@@ -2,9 +2,9 @@
 
 use super::point::{Notes, Point, Values};
 use super::rule::Meeting;
-use crate::error::FieldError;
+use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
-use crate::motion::CurrentMotion;
+use crate::motion::{CurrentMotion, Guard};
 use crate::status::Stop;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{DOUBTFUL, EPS, MOST_MEETING, ROUNDING};
@@ -72,6 +72,36 @@ pub(super) fn consistency(
         slid.iter().for_each(|&j| mode.set(j, 0));
     }
     Ok(Consistency::Agrees { mode, vanishing })
+}
+
+/// A mode that follows at a meeting of many surfaces, with the signs that other functions have in it; why the run ends if the
+/// mode does not agree with its own signs. Of few surfaces between which functions jump a rule of theirs has decided before.
+pub(super) fn agreeing_with_own_signs(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    mode: Mode,
+) -> Result<Result<Mode, Stop>, FieldError> {
+    let entries: Vec<i8> = meeting
+        .surfaces
+        .iter()
+        .map(|&j| mode.entries()[j])
+        .collect();
+    let entries = Mode::new(entries);
+    let is_few = meeting.surfaces.len() <= MOST_MEETING;
+    if !at.system.has_nested_signs() || is_few || entries.codimension() > MOST_MEETING {
+        return Ok(Ok(mode));
+    }
+    let surfaces = meeting.surfaces.to_vec();
+    Ok(match consistency(at, notes, meeting, &entries)? {
+        Consistency::Agrees { mode, .. } => Ok(mode),
+        Consistency::Contradicts(j) => Err(Stop::Intersection {
+            surfaces,
+            failing: vec![(mode, Guard::Surface(j))],
+            reason: Undecided::NoOutcome,
+        }),
+        Consistency::Between(jumping) => Err(Stop::SlidesAcrossJump { surfaces, jumping }),
+    })
 }
 
 /// What jumps between two modes.

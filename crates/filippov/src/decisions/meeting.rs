@@ -1,6 +1,7 @@
 //! Where surfaces meet: what follows at an intersection, from the switching stage.
 
 use super::choice::{asked, choose};
+use super::consistency::agreeing_with_own_signs;
 use super::first_order::resolution;
 use super::germ::surfaces_left;
 use super::germs::{decide_by_germs, decide_undecided};
@@ -86,6 +87,10 @@ fn follow(
             notes.candidates = modes;
         }
     }
+    let after = match agreeing_with_own_signs(at, notes, place, after)? {
+        Ok(mode) => mode,
+        Err(stop) => return Ok(Err(stop)),
+    };
     let multipliers: &[f64] = if after == preferred && !is_spiral {
         &resolution.multipliers
     } else {

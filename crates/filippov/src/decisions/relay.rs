@@ -1,7 +1,7 @@
 //! Meetings of surfaces where the field is affine in their signs: one relay problem, whatever their number.
 
 use super::choice::choose;
-use super::consistency::{consistency, Consistency};
+use super::consistency::agreeing_with_own_signs;
 use super::germ::surfaces_left;
 use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
@@ -11,7 +11,7 @@ use super::touching::Parallels;
 use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution, Uniqueness};
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
-use crate::motion::{Guard, SmoothField};
+use crate::motion::SmoothField;
 use crate::sparse::SparseRows;
 use crate::status::Stop;
 use crate::system::dot;
@@ -63,25 +63,11 @@ pub(super) fn decide_by_relay(
         return Ok(None);
     }
     let_go(at, mode, surfaces, &mut found);
-    let entries = Mode::new(found.modes.clone());
-    let mut after = meeting.on_all(&entries);
-    // Of few surfaces between which functions jump another rule has decided.
-    if at.system.has_nested_signs() && !is_few && entries.codimension() <= MOST_MEETING {
-        after = match consistency(at, notes, meeting, &entries)? {
-            Consistency::Agrees { mode, .. } => mode,
-            Consistency::Contradicts(j) => {
-                return Ok(Some(Err(Stop::Intersection {
-                    surfaces: surfaces.to_vec(),
-                    failing: vec![(after, Guard::Surface(j))],
-                    reason: Undecided::NoOutcome,
-                })))
-            }
-            Consistency::Between(jumping) => {
-                let surfaces = surfaces.to_vec();
-                return Ok(Some(Err(Stop::SlidesAcrossJump { surfaces, jumping })));
-            }
-        };
-    }
+    let mut after = meeting.on_all(&Mode::new(found.modes.clone()));
+    after = match agreeing_with_own_signs(at, notes, meeting, after)? {
+        Ok(mode) => mode,
+        Err(stop) => return Ok(Some(Err(stop))),
+    };
     if !is_certain {
         match choose(at, notes, surfaces, after.clone(), vec![after.clone()]) {
             Ok(chosen) => after = chosen,
