@@ -109,8 +109,8 @@ def normalise_events(events: Any) -> list[EventSpec] | None:
                 raise InputError(
                     f"events: entry {len(specs)} is not a function g(t, y) but {type(entry).__name__}"
                 )
-            direction = check_direction(getattr(entry, "direction", 0), "events")
-            terminal = _check_terminal(getattr(entry, "terminal", False))
+            direction = check_direction(getattr(entry, "direction", 0.0), "events")
+            terminal = _check_terminal(getattr(entry, "terminal", None))
             specs.append(EventSpec(entry, direction, terminal, function_name(entry, "event")))
         else:
             specs.append(EventSpec(entry.g, entry.direction, entry.terminal, entry.name))

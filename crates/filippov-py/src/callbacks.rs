@@ -430,7 +430,8 @@ pub struct CompiledEvent {
 impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64], q: &[f64]) -> Result<f64, FieldError> {
         let n = self.n_inner();
-        let mut signs: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, n);
+        let mut signs: SmallVec<[f64; 8]> = SmallVec::new();
+        signs.resize(n, 0.0);
         for part in 0..n {
             let value = SmoothParts::value(self, part, &Setting::new(&signs, q).at(t, x));
             signs[part] = if value == 0.0 { 0.0 } else { value.signum() };

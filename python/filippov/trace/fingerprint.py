@@ -132,6 +132,8 @@ def fingerprint(*values: Any) -> Fingerprint | None:
     """
     first, *others = values
     try:
+        if not others:
+            return _items_of(first)
         if not all(map(_is_plain, others)):
             return tuple(_read(values).items)
         # Version 2: types and bits, and nothing that depends on who else holds the values.

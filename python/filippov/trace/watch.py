@@ -79,4 +79,4 @@ class Watch:
                     return False
             except ValueError:  # no longer assigned
                 return False
-        return all(function.is_unchanged() for function in self._pure)
+        return not self._pure or all(function.is_unchanged() for function in self._pure)

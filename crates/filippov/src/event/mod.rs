@@ -19,7 +19,7 @@ mod user_events;
 
 pub use function::{AffinePart, Event, Found, Multiple, SmoothParts, UserEvent, UserFunction};
 pub use user_events::UserZero;
-pub(crate) use user_events::{StepEnd, UserEvents, TICK};
+pub(crate) use user_events::{AtEnd, StepEnd, UserEvents, TICK};
 
 #[cfg(test)]
 mod tests;

@@ -25,6 +25,23 @@ pub(crate) enum StepEnd {
     Stops,
 }
 
+/// What a search knows of a function where it ends.
+#[derive(Clone, Copy)]
+pub(crate) struct AtEnd {
+    /// Its sign, of the piece that ends there.
+    pub side: f64,
+    /// Its value; NaN if it is not known.
+    pub value: f64,
+}
+
+impl AtEnd {
+    /// The sign alone.
+    pub fn of_side(side: f64) -> Self {
+        let value = f64::NAN;
+        AtEnd { side, value }
+    }
+}
+
 /// The user's functions and their zeros so far.
 pub(crate) struct UserEvents<'a> {
     pub events: &'a [UserEvent<'a>],
@@ -34,8 +51,8 @@ pub(crate) struct UserEvents<'a> {
     pub before: Vec<f64>,
     /// Sign at the end of the last step, per event, of the piece that ends there; 0 if the state has jumped since.
     pub sides: Vec<f64>,
-    /// The same of the step that is searched.
-    pub found_sides: RefCell<Vec<f64>>,
+    /// Of the step that is searched, per event.
+    pub at_end: RefCell<Vec<AtEnd>>,
     /// Discrete states, as they were when the motion began.
     q: Vec<f64>,
     /// What happens at the end of the step that is searched.
@@ -61,7 +78,7 @@ impl<'a> UserEvents<'a> {
             events,
             left: vec![f64::NAN; d],
             sides: vec![0.0; d],
-            found_sides: RefCell::new(vec![0.0; d]),
+            at_end: RefCell::new(vec![AtEnd::of_side(0.0); d]),
             q: Vec::new(),
             end: StepEnd::GoesOn,
             may_have_jumped: false,
@@ -87,7 +104,8 @@ impl<'a> UserEvents<'a> {
     /// Keeps the signs that the search of the accepted step found.
     pub fn accept_sides(&mut self) {
         self.may_have_jumped = false;
-        self.sides.copy_from_slice(&self.found_sides.borrow());
+        let sides = self.sides.iter_mut().zip(self.at_end.get_mut());
+        sides.for_each(|(side, found)| *side = found.side);
     }
 
     /// Forgets the signs before a jump of the state, so that the next step does not compare its own with them.

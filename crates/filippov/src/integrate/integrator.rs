@@ -395,6 +395,9 @@ impl<'a> Integrator<'a> {
     /// What happens at the end of the step, at `t_stop`, where these guards vanish.
     #[cold]
     fn end_of_step(&self, found: Option<&Found>, t_stop: f64) -> StepEnd {
+        if found.is_none() && t_stop < self.horizon {
+            return StepEnd::GoesOn;
+        }
         let triggers = self.run.motion.triggers(self.run.system);
         let is_tick = t_stop >= self.horizon && self.horizon < self.t_end;
         let mut timed = self.run.actions.list.iter().filter(|action| {

@@ -1,6 +1,7 @@
 //! The zeros of the user's functions, and ticks of a section, in the step that is accepted.
 
 use filippov_expr::sort_few;
+use smallvec::{smallvec, SmallVec};
 
 use super::Recorder;
 use crate::error::FieldError;
@@ -61,13 +62,13 @@ impl Recorder<'_> {
                 _ => (t0 + at * dt).min(t_stop),
             };
             let run = &mut *search.run;
-            let mut y = vec![0.0; run.x.len()];
+            let mut y: SmallVec<[f64; 8]> = smallvec![0.0; run.x.len()];
             search.stepper.interpolant().at(at, &mut y);
             run.motion.project(t, &mut y)?;
             if let Some(stop) = self.zero(index, t, &y) {
                 self.sample_step(t, &run.x, search.stepper, &mut run.motion)?;
                 self.step(search.stepper.interpolant(), t, &y);
-                (run.t, run.x) = (t, y);
+                (run.t, run.x) = (t, y.into_vec());
                 return Ok(Some(stop));
             }
         }
@@ -78,8 +79,10 @@ impl Recorder<'_> {
         let is_needed = theta == 1.0 || events.end == StepEnd::Stops;
         for k in 0..events.events.len() {
             events.before[k] = events.left[k];
+            let known = events.at_end.get_mut()[k].value;
             events.left[k] = match is_needed {
-                true => search.user_value(events.events[k].function, theta)?,
+                true if known.is_nan() => search.user_value(events.events[k].function, theta)?,
+                true => known,
                 false => f64::NAN,
             };
         }

@@ -132,7 +132,7 @@ pub const SAME_VALUE: f64 = 1e-10;
 /// Terms of a series that together are below this share of the first one are left out where its zeros are told apart: the
 /// work grows with the square of their number. The larger the share, the more zeros are too close to others to be told apart
 /// by the terms that are kept, and are looked for again with all of them.
-pub const SMALL_REST: f64 = 1e-5;
+pub const SMALL_REST: f64 = 1e-3;
 
 /// The same where it is only asked whether there is a zero at all: terms that others may outweigh.
 pub const REST_BESIDE: f64 = 0.125;

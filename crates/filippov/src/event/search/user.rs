@@ -10,8 +10,9 @@ use smallvec::{smallvec, SmallVec};
 use super::user_piece::{value_along, Along, Outcome, Source, Start};
 use super::StepSearch;
 use crate::error::FieldError;
-use crate::event::{SmoothParts, StepEnd, UserEvent, UserEvents, UserFunction};
+use crate::event::{AtEnd, SmoothParts, StepEnd, UserEvents, UserFunction};
 use crate::mode::Signs;
+use crate::stepper::Interpolant;
 use crate::tolerances::{
     MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
     SHARES_BEHIND_ZERO,
@@ -130,27 +131,13 @@ impl StepSearch<'_, '_> {
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         let mut zeros = Vec::new();
         for index in 0..events.events.len() {
-            let UserEvent {
-                function,
-                direction,
-                ..
-            } = events.events[index];
-            let Some(changes) = self.changes_of_event(events, index, theta)? else {
-                return Ok(None);
-            };
-            let wanted = |change: &&Change| direction * change.before <= 0.0;
-            zeros.extend(
-                changes
-                    .iter()
-                    .filter(wanted)
-                    .map(|change| (change.at, index)),
-            );
-            if zeros.len() > MOST_ZEROS {
+            if !self.add_zeros(events, index, theta, &mut zeros)? || zeros.len() > MOST_ZEROS {
                 return Ok(None);
             }
             if events.at_start && events.left[index] == 0.0 {
-                let sign = sign_of(self.user_value(function, 1e-7 * theta)?);
-                if sign != 0.0 && direction * sign >= 0.0 {
+                let event = &events.events[index];
+                let sign = sign_of(self.user_value(event.function, 1e-7 * theta)?);
+                if sign != 0.0 && event.direction * sign >= 0.0 {
                     zeros.push((0.0, index));
                 }
             }
@@ -158,15 +145,22 @@ impl StepSearch<'_, '_> {
         Ok(Some(zeros))
     }
 
-    /// The changes of sign of a user's function; `None` if a shorter step is needed.
-    fn changes_of_event(
+    /// Adds the zeros of a user's function that are in its direction; false if a shorter step is needed.
+    fn add_zeros(
         &mut self,
         events: &UserEvents,
         index: usize,
         theta: f64,
-    ) -> Result<Option<Vec<Change>>, FieldError> {
+        zeros: &mut Vec<(f64, usize)>,
+    ) -> Result<bool, FieldError> {
+        let direction = events.events[index].direction;
+        let mut add = |at: f64, before: f64| {
+            if direction * before <= 0.0 {
+                zeros.push((at, index));
+            }
+        };
         let function = events.events[index].function;
-        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
+        let &Interpolant { t0, dt, .. } = self.stepper.interpolant();
         // It is not known where a motion went on from within a step.
         let left = match events.left[index] {
             value if value.is_nan() => self.user_value(function, 0.0)?,
@@ -180,15 +174,25 @@ impl StepSearch<'_, '_> {
         };
         let Some(parts) = function.parts() else {
             let along = Source::Sampled(function);
-            let changes = self.changes_along(along, &Cuts::none(0), theta, start)?;
-            return Ok(changes.map(|found| found.0));
+            let Some((changes, side)) = self.changes_along(along, &Cuts::none(0), theta, start)?
+            else {
+                return Ok(false);
+            };
+            changes
+                .iter()
+                .for_each(|change| add(change.at, change.before));
+            events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
+            return Ok(true);
         };
         if parts.n_inner() == 0 && !events.may_have_jumped {
             let told = self.zeros_of_affine(parts, left, start.of_piece(0.0), theta);
-            if let Some((sign, zeros)) = told {
-                let mut changes = Vec::new();
-                events.found_sides.borrow_mut()[index] = add_changes(sign, &zeros, &mut changes);
-                return Ok(Some(changes));
+            if let Some(((mut side, found), value)) = told {
+                for at in found {
+                    add(at, side);
+                    side = -side;
+                }
+                events.at_end.borrow_mut()[index] = AtEnd { side, value };
+                return Ok(true);
             }
         }
         let mut cuts = Cuts::none(parts.n_inner());
@@ -200,16 +204,19 @@ impl StepSearch<'_, '_> {
         }
         for part in 0..parts.n_inner() {
             if !self.add_cuts(parts, part, &mut cuts, theta)? {
-                return Ok(None);
+                return Ok(false);
             }
         }
         let whole = Source::Part(parts, parts.n_inner());
         cuts.end = events.end;
-        let changes = self.changes_along(whole, &cuts, theta, start)?;
-        if let Some((_, side)) = &changes {
-            events.found_sides.borrow_mut()[index] = *side;
-        }
-        Ok(changes.map(|found| found.0))
+        let Some((changes, side)) = self.changes_along(whole, &cuts, theta, start)? else {
+            return Ok(false);
+        };
+        changes
+            .iter()
+            .for_each(|change| add(change.at, change.before));
+        events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
+        Ok(true)
     }
 
     /// Adds the zeros of a switching function to the cuts; false if a shorter step is needed.

@@ -117,8 +117,7 @@ fn zeros_of_series(rows: &[f64], search: &StepSearch, start: Start, to: f64) -> 
     let is_first = start.from == 0.0 && (divided == 1 || left == start.sign);
     let series = Series::new(rows);
     let is_clear = || rows[0].abs() > others + noise;
-    let stays = || left * series.ends()[1] > 0.0 && series.has_sign(left, noise);
-    if is_first && (is_clear() || stays()) {
+    if is_first && is_clear() {
         return Some((left, SmallVec::new()));
     }
     let interpolant = search.stepper.interpolant();
@@ -258,17 +257,24 @@ impl<'f> Along<'f> {
 }
 
 impl StepSearch<'_, '_> {
-    /// What its series tells of a smooth affine function up to `to`, with this value at the start.
+    /// What its series tells of a smooth affine function up to `to`, with this value at the start; and the value
+    /// at the end of the step, NaN if `to` is before it.
     pub(super) fn zeros_of_affine(
         &mut self,
         parts: &dyn SmoothParts,
         value: f64,
         start: Start,
         to: f64,
-    ) -> Option<Told> {
+    ) -> Option<(Told, f64)> {
         let mut series = NO_TERMS;
         let n_terms = affine_series(parts, parts.n_inner(), self, |_| Ok(value), &mut series)?;
-        zeros_of_series(&series[..n_terms], self, start, to)
+        let series = &series[..n_terms];
+        let told = zeros_of_series(series, self, start, to)?;
+        let value_at_end = match to == 1.0 {
+            true => Series::new(series).ends()[1],
+            false => f64::NAN,
+        };
+        Some((told, value_at_end))
     }
 
     /// The first zero up to `to`, which `is_last` says to be the end of the search.
