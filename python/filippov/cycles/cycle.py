@@ -217,7 +217,9 @@ class Cycle:
         """
         itinerary, motions = self.itinerary, self._shooting.motions
         lost = [_codimension(motions, leg) for leg in itinerary.legs]
-        ranked = zip(lost, (-duration for duration in itinerary.durations), strict=True)
+        # Pieces that rounding alone tells apart are equally long.
+        shares = (-round(duration / self.period, 9) for duration in itinerary.durations)
+        ranked = zip(lost, shares, strict=True)
         place = min(range(len(lost)), key=list(ranked).__getitem__)
         t = self.t0 + sum(itinerary.durations[:place]) + 0.5 * itinerary.durations[place]
         return t, self.at(t)
