@@ -220,6 +220,18 @@ def test_where_there_is_no_derivative_the_gradient_is_nan() -> None:
         ({"terminal": 3}, "terminal: a function"),
         ({"running": "v"}, "running: a function"),
         ({"terminal": lambda t, y: y}, "terminal"),
+        ({"terminal": lambda t, y: y[:1]}, r"terminal must return one real number, .* of shape \(1,\)"),
+        ({"terminal": lambda t, y: y[0] if t < 1 else y}, "terminal must return one real number"),
+        ({"terminal": lambda t, y: np.nan * y[0]}, "terminal must return a finite number"),
+        ({"running": lambda t, y: y}, "running must return one real number"),
+        ({"running": lambda t, y: y[:1]}, "running must return one real number"),
+        ({"running": lambda t, y: y[0] if t < 1 else y}, "running: its derivative is not known"),
+        (
+            {"running": lambda t, y: y[0] if float(y[0]).hex() else 1.0},
+            "running: its derivative is not known",
+        ),
+        ({"instants": 3}, "instants: a list of pairs"),
+        ({"instants": [(1.0, lambda t, y: y[:1])]}, "instants: entry 0 must return one real number"),
         ({"instants": [3]}, "instants: entry 0: a pair"),
         ({"instants": [(1.0, 3)]}, "instants: entry 0: the cost"),
         ({"instants": [("w", lambda t, y: y[0])]}, "there is no surface 'w'"),
@@ -240,6 +252,19 @@ def test_a_start_on_a_surface_is_named() -> None:
         fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="y0")
     _, found = fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="a")
     assert found["a"] == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["terminal", "running"])
+def test_a_black_box_has_no_gradient(kind: str) -> None:
+    def called(t: float, x: Any) -> list[float]:
+        return [float(str(float(x[0])))]
+
+    costs: dict[str, Any] = {kind: lambda t, y: y[0]}
+    box = fl.System(called, n=1, surfaces=[])
+    with pytest.raises(fl.InputError, match="wrt: derivatives are those of a traced function"):
+        fl.gradient(box, (0, 1), [1.0], wrt="y0", **costs)
+    with pytest.raises(fl.TraceError, match="fun could not be traced"):
+        fl.gradient(fl.System(called, n=1), (0, 1), [1.0], wrt="y0", **costs)
 
 
 def test_a_system_is_needed() -> None:

@@ -194,32 +194,37 @@ def default_parameters(function: Callable[..., Any], n_given: int = 0) -> dict[s
     }
 
 
-def check_scalar_function(
-    g: Callable[[float, Any], Any], t0: float, y0: Any, what: str, *, changes_sign: bool = True
-) -> None:
-    """Call `g` once at the start and refuse what is not a single real number.
+def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
+    """Call `g`, whose zeros are searched, once at the start; refuse what is not a single real number."""
+    value = np.asarray(check_scalar(call_once(g, t0, y0, what), what))
+    if value.dtype.kind == "b":
+        raise InputError(
+            f"{what} returned {bool(value)}, which never changes its sign: "
+            "in place of a comparison `a > b` return the difference `a - b`"
+        )
 
-    A function whose zeros are searched (`changes_sign`) may not return a truth value: it is never negative.
-    """
+
+def call_once(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> Any:
+    """Return the value of `g` at the start; what it raises is an error that names `what`."""
     try:
-        returned = g(t0, y0.copy())
-        value = np.asarray(returned)
+        return g(t0, y0.copy())
     except Exception as error:
         raise InputError(f"{what} {_failure(error)}") from error
+
+
+def check_scalar(returned: Any, what: str, *, in_array: bool = True) -> Any:
+    """Refuse what is not a single real number; with `in_array` an array of one number is such."""
     if returned is None:
         raise InputError(f"{what} returned None: is a `return` missing?")
     if isinstance(returned, (list, tuple)):
         kind = type(returned).__name__
         raise InputError(f"{what} must return one real number, not a {kind}: leave out the brackets")
-    if value.size != 1 or value.dtype.kind not in "fiub":
+    value = np.asarray(returned)
+    if value.size != 1 or (value.ndim and not in_array) or value.dtype.kind not in "fiub":
         raise InputError(
             f"{what} must return one real number, it returned {value.dtype.name} of shape {value.shape}"
         )
-    if changes_sign and value.dtype.kind == "b":
-        raise InputError(
-            f"{what} returned {bool(value)}, which never changes its sign: "
-            "in place of a comparison `a > b` return the difference `a - b`"
-        )
+    return returned
 
 
 def _failure(error: Exception) -> str:

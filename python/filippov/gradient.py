@@ -14,12 +14,13 @@ from filippov._core import Run, TracedSystem
 from filippov.arrays import real_array
 from filippov.caution import warn_user
 from filippov.derivatives import Back
-from filippov.errors import InputError, ModelError
+from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import (
     Event,
     accepted_names,
     bind_function,
-    check_scalar_function,
+    call_once,
+    check_scalar,
     normalise_events,
     selective,
 )
@@ -29,7 +30,7 @@ from filippov.resets import Reset
 from filippov.solution import Solution
 from filippov.switches import Borders, borders_of
 from filippov.system import System
-from filippov.trace.tracer import trace_output
+from filippov.trace.tracer import Trace, trace_output
 from filippov.unknown import did_you_mean
 
 __all__ = ["gradient"]
@@ -93,7 +94,8 @@ def gradient(
     Raises
     ------
     InputError
-        If a cost is no function or does not return a number, a name is unknown, or the system is not traced.
+        If a cost is no function or does not return one finite number, a name is unknown, or the system or a
+        cost is not traced.
     ModelError
         If the run fails; ``partial`` is the part that was computed.
 
@@ -122,8 +124,7 @@ def gradient(
     costs = [("terminal", terminal), ("running", running), *((part.name, part.cost) for part in parts)]
     for name, cost in costs:
         if cost is not None:
-            bound = bind_function(cost, (), values)
-            check_scalar_function(bound, t0, start, name, changes_sign=False)
+            _number(call_once(bind_function(cost, (), values), t0, start, name), name)
 
     followed, final = system, terminal
     if running is not None:
@@ -134,7 +135,13 @@ def gradient(
             options["atol"] = np.append(options["atol"], np.min(options["atol"]))
     own_parts = (part.event for part in parts if part.event is not None)
     watched = [_of_first(event, n) for event in (*own, *own_parts)]
-    sol = followed.solve((t0, t1), start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
+    more = {"events": watched, "wrt": Back(wrt), "dense_output": True, **options}
+    try:
+        sol = followed.solve((t0, t1), start, params, **more)
+    except TraceError:
+        if running is not None:
+            _refuse_untraced(running, system.prepare(n, t0, start[:n], values).trace, values)
+        raise
     if not sol.success:
         raise ModelError(sol.message, partial=sol)
 
@@ -197,13 +204,31 @@ def _checked(
     refused = [name for name in _REFUSED if name in options]
     if refused:
         raise InputError(f"{refused[0]}: it is not an option of a gradient")
-    if terminal is None and running is None and not len(instants):
+    try:
+        parts = [_Part.of(entry, k) for k, entry in enumerate(instants)]
+    except TypeError:
+        raise InputError(f"instants: a list of pairs (when, cost) is needed, not {instants!r}") from None
+    if terminal is None and running is None and not parts:
         raise InputError("terminal, running, instants: there is no cost")
     for name, cost in (("terminal", terminal), ("running", running)):
         if cost is not None and not callable(cost):
             raise InputError(f"{name}: a function {name}(t, y) is needed, not {type(cost).__name__}")
     specs = normalise_events(events) or []
-    return [Event(*spec) for spec in specs], [_Part.of(entry, k) for k, entry in enumerate(instants)]
+    return [Event(*spec) for spec in specs], parts
+
+
+def _number(returned: Any, name: str) -> float:
+    """Return the value of a cost, which has to be one finite real number."""
+    value = float(check_scalar(returned, name, in_array=False))
+    if not np.isfinite(value):
+        raise InputError(f"{name} must return a finite number, it returned {value}")
+    return value
+
+
+def _refuse_untraced(running: Cost, trace: Trace | None, values: Mapping[str, float]) -> None:
+    found = None if trace is None else trace_output(trace, selective(running, dict(values)))
+    if isinstance(found, str):
+        raise InputError(f"running: its derivative is not known: {found}")
 
 
 def _has_ended(sol: Solution, k: int) -> bool:
@@ -248,7 +273,10 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
 
     def fun(t: Any, x: Any, *args: Any, **params: Any) -> list[Any]:
         rates = np.ravel(np.asarray(source.fun(t, x[:n], *args, **params), dtype=object))
-        return [*rates, running(t, x[:n], **_named(running, params))]
+        rate = running(t, x[:n], **_named(running, params))
+        if np.ndim(rate):
+            check_scalar(rate, "running", in_array=False)
+        return [*rates, rate]
 
     def before(function: Cost) -> Cost:
         return lambda t, x, *args, **params: function(t, x[:n], *args, **_named(function, params))
@@ -295,7 +323,7 @@ class _Sum:
         first, last = float(self._sol.t[0]), float(self._sol.t[-1])
         if not first <= t <= last:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
-        self._add_value(cost, t)
+        self._add_value(name, cost, t)
         known = None if zero is None else self._trace(name, zero)
         function = self._trace(name, cost, None if zero is not None else t)
         self._terms.append((function, t, None, known))
@@ -303,7 +331,7 @@ class _Sum:
     def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
         """Add a function at the end of the run, which is at a zero of another function if this is given."""
         values = self._values_at(self._sol.t[-1], False)
-        self.value += float(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, values)))
+        self.value += _number(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, values)), name)
         known = None if zero is None else self._trace(name, zero)
         self._terms.append((self._trace(name, cost), None, None, known))
 
@@ -316,7 +344,7 @@ class _Sum:
         place = surfaces.index(surface)
         for switch in self._sol.switches:
             if switch.surfaces[:1] == (place,):
-                self._add_value(cost, switch.t)
+                self._add_value(name, cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
 
     def gradient(self) -> tuple[Array, tuple[float, str] | None, Borders]:
@@ -325,10 +353,10 @@ class _Sum:
         assert isinstance(run, Run)
         return run.cost_gradient(self._terms)
 
-    def _add_value(self, cost: Cost, t: float) -> None:
+    def _add_value(self, name: str, cost: Cost, t: float) -> None:
         assert self._sol.sol is not None
         y = self._sol.sol(t, side="left")
-        self.value += float(cost(t, y, **_named(cost, self._values_at(t, True))))
+        self.value += _number(cost(t, y, **_named(cost, self._values_at(t, True))), name)
 
     def _values_at(self, t: float, is_left: bool) -> dict[str, float]:
         """Return the values of the parameters, and of the discrete states at a time."""
