@@ -401,12 +401,13 @@ impl StepSearch<'_, '_> {
                         n_cuts += 1;
                         ends.push(start.from + 0.5 * length);
                     } else {
-                        *start = self.start_at(along, to, start.sign)?;
+                        *start = self.start_at(along, to, start.sign, changes)?;
                         ends.pop();
                     }
                 }
                 Outcome::Pole(at) => {
-                    *start = self.start_at(along, (at + together).min(to_end), start.sign)?;
+                    let behind = (at + together).min(to_end);
+                    *start = self.start_at(along, behind, start.sign, changes)?;
                     ends.retain(|end| *end > start.from);
                     // Behind it in pieces over which the function does not change by orders of magnitude.
                     let mut length = ends.last().map_or(0.0, |end| end - start.from);
@@ -508,16 +509,31 @@ impl StepSearch<'_, '_> {
         (1..=n).rev().map(end).collect()
     }
 
-    /// The search goes on from a point that no zero led to.
-    fn start_at(&mut self, along: &Along, from: f64, before: f64) -> Result<Start, FieldError> {
+    /// The search goes on from a point that no zero led to. A sign inside of a function may be another one there, which is no
+    /// zero of the function.
+    fn start_at(
+        &mut self,
+        along: &Along,
+        from: f64,
+        before: f64,
+        changes: &mut Vec<Change>,
+    ) -> Result<Start, FieldError> {
         let value = along.value(self, from)?;
+        let sign = match value.is_nan() {
+            true => before,
+            false => value.signum(),
+        };
+        if along.is_inner() && sign != before {
+            changes.push(Change {
+                at: from,
+                before,
+                after: sign,
+            });
+        }
         Ok(Start {
             from,
             divided: value == 0.0,
-            sign: match value.is_nan() {
-                true => before,
-                false => value.signum(),
-            },
+            sign,
             clear: 0.0,
         })
     }
