@@ -6,7 +6,9 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use filippov_expr::{roots, BinaryOp, Graph, Names, NodeId, Pieces, Regions, Switching, UnaryOp};
+use filippov_expr::{
+    roots, BinaryOp, Graph, Names, NodeId, PartSign, Pieces, Regions, Switching, UnaryOp,
+};
 use ruff_text_size::{Ranged, TextRange};
 
 use crate::constants_of_motion::Constants;
@@ -22,7 +24,7 @@ const MOST_COMBINATIONS: usize = 1024;
 const MOST_AFTER_MANY: usize = 32;
 const MANY: usize = 3;
 /// An expression that jumps is taken apart into that many parts at most.
-const MOST_JUMPING_PARTS: usize = 32;
+const MOST_JUMPING_PARTS: usize = 128;
 
 /// What was asked about an expression.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -275,6 +277,7 @@ impl Tracer {
 
     /// The sign of an expression.
     pub fn sign(&mut self, node: NodeId) -> Result<NodeId, Refused> {
+        let node = self.graph.without_cancelled(node);
         if let Some(known) = self.sign_everywhere(node)? {
             return Ok(self.graph.constant(known));
         }
@@ -310,6 +313,7 @@ impl Tracer {
 
     /// The absolute value of an expression.
     pub fn absolute(&mut self, node: NodeId) -> Result<NodeId, Refused> {
+        let node = self.graph.without_cancelled(node);
         if let Some(known) = self.sign_everywhere(node)? {
             return Ok(if known >= 0.0 {
                 node
@@ -337,6 +341,7 @@ impl Tracer {
         is_largest: bool,
     ) -> Result<NodeId, Refused> {
         let difference = self.binary(BinaryOp::Sub, first, second);
+        let difference = self.graph.without_cancelled(difference);
         if let Some(known) = self.sign_everywhere(difference)? {
             return Ok(if (known >= 0.0) == is_largest {
                 first
@@ -374,7 +379,7 @@ impl Tracer {
 
     /// The condition that an expression is positive, or not negative.
     pub fn compare(&mut self, node: NodeId, is_strict: bool) -> Result<Answer, Refused> {
-        let mut node = node;
+        let mut node = self.graph.without_cancelled(node);
         let known = match self.sign_everywhere(node)? {
             Some(known) => known,
             None => {
@@ -426,10 +431,10 @@ impl Tracer {
 
     /// The condition that an expression is zero; `None` if that is so at single points only.
     pub fn equal(&mut self, node: NodeId) -> Result<Option<Answer>, Refused> {
+        let mut node = self.graph.without_cancelled(node);
         if let Some(known) = self.known_sign(node) {
             return Ok(Some(Answer::Known(known == 0.0)));
         }
-        let mut node = node;
         if self.is_constant_of_motion(node) {
             node = Laws::sign(self, node)?;
         }
@@ -502,10 +507,8 @@ impl Tracer {
         let is_whole = match &pieces {
             None => true,
             Some(Pieces::Part(_, sign)) => {
-                let is_zero = *sign == filippov_expr::PartSign::Known(0.0);
-                if let (filippov_expr::PartSign::Known(sign), false, false) =
-                    (*sign, in_full, is_zero)
-                {
+                let is_zero = *sign == PartSign::Known(0.0);
+                if let (PartSign::Known(sign), false, false) = (*sign, in_full, is_zero) {
                     self.signs.insert(node, sign);
                 }
                 !in_full && !is_zero
@@ -515,26 +518,28 @@ impl Tracer {
         if is_whole {
             pieces = match in_full {
                 true => None,
-                false => self.jumping_parts(node)?,
+                false => self.parts_apart(node)?,
             };
         }
         self.pieces.insert((node, in_full), pieces.clone());
         Ok(pieces)
     }
 
-    /// The parts of an expression that jumps with a sign inside of it: each switches where it does.
-    fn jumping_parts(&mut self, node: NodeId) -> Result<Option<Pieces>, Refused> {
-        if Laws::reads_any(self, node) {
-            return Ok(None);
-        }
+    /// The parts of an expression that jumps with a sign in it, or has a constant of motion as one: each switches where it
+    /// does.
+    fn parts_apart(&mut self, node: NodeId) -> Result<Option<Pieces>, Refused> {
         let (parts, for_these_values) = self.in_regions(|regions| {
             let parts = regions.pieces(node, MOST_JUMPING_PARTS, true);
             (parts, regions.used_parameters())
         });
-        if parts.is_none() || for_these_values || !self.jumps(node) {
+        let Some(parts) = parts.filter(|_| !for_these_values) else {
             return Ok(None);
-        }
-        Ok(parts)
+        };
+        let open = parts_of(&parts).into_iter();
+        let mut open = open.filter(|(_, sign)| *sign == PartSign::Open);
+        let stays = open.any(|(part, _)| self.is_constant_of_motion(part));
+        let is_apart = stays || !Laws::reads_any(self, node) && self.jumps(node);
+        Ok(is_apart.then_some(parts))
     }
 
     /// Asks for regions in the graph itself, which receives new nodes.
@@ -590,24 +595,43 @@ impl Tracer {
         }
         let positive = parts_of(&pieces).into_iter();
         let mut parts: Vec<NodeId> = positive
-            .filter(|(_, sign)| *sign == filippov_expr::PartSign::Known(1.0))
+            .filter(|(_, sign)| *sign == PartSign::Known(1.0))
             .map(|(part, _)| part)
             .collect();
         parts.push(argument);
-        for inner in parts {
-            let inside = self.unary(UnaryOp::NotNegative, inner);
-            let continued = self.root_of(inside, of);
-            let root = self.root_of(inner, of);
-            match self.continued.iter_mut().find(|known| known.0 == root) {
-                Some(known) => known.1 = continued,
-                None => self.continued.push((root, continued)),
-            }
-        }
+        parts
+            .into_iter()
+            .for_each(|inner| self.let_continue(inner, of));
         let continued = self.continued.iter().find(|known| known.0 == root);
         match (continued, self.jumps(argument)) {
             (Some(&(_, continued)), true) => continued,
             _ => root,
         }
+    }
+
+    /// Lets a root be zero in switching functions where its argument is negative.
+    fn let_continue(&mut self, argument: NodeId, of: Root) {
+        let inside = self.unary(UnaryOp::NotNegative, argument);
+        let continued = self.root_of(inside, of);
+        let root = self.root_of(argument, of);
+        match self.continued.iter_mut().find(|known| known.0 == root) {
+            Some(known) => known.1 = continued,
+            None => self.continued.push((root, continued)),
+        }
+    }
+
+    /// A cube root as sign and size, the size continued in switching functions as a root.
+    fn cube_root_by_sign(&mut self, argument: NodeId) -> Result<NodeId, Refused> {
+        let third = Root::Power(self.graph.constant(1.0 / 3.0));
+        let size = self.absolute(argument)?;
+        let negated = self.unary(UnaryOp::Neg, argument);
+        for inner in [size, argument, negated] {
+            self.let_continue(inner, third);
+        }
+        let root = self.root_of(size, third);
+        self.graph.declare_not_negative(root);
+        let sign = self.sign(argument)?;
+        Ok(self.binary(BinaryOp::Mul, sign, root))
     }
 
     /// A field whose cube roots switch with the sign of their argument: at zero they have no slope.
@@ -621,11 +645,7 @@ impl Tracer {
             }
             let argument = self.graph.substituted(argument, &images);
             if let Root::Cube = of {
-                let absolute = self.absolute(argument)?;
-                let third = self.graph.constant(1.0 / 3.0);
-                let size = self.binary(BinaryOp::Pow, absolute, third);
-                let sign = self.sign(argument)?;
-                images.push((root, self.binary(BinaryOp::Mul, sign, size)));
+                images.push((root, self.cube_root_by_sign(argument)?));
             }
         }
         if images.is_empty() {

@@ -472,13 +472,23 @@ class Tracer:
                 continue
             argument = builder.substituted(argument, images)
             if of is None:
-                size = builder.binary("power", self.absolute(argument), builder.constant(1.0 / 3.0))
-                images.append((root, builder.binary("multiply", self.sign(argument), size)))
+                images.append((root, self._cube_root_by_sign(argument)))
             elif root_ends and self._switches_at(argument):
                 inside = builder.unary("not negative", argument) if root_ends == "floor" else argument
                 images.append((root, self.choose(argument, of(inside), builder.constant(0.0))))
                 self.ends_of_roots.append(argument)
         return [builder.substituted(component, images) for component in field] if images else field
+
+    def _cube_root_by_sign(self, argument: int) -> int:
+        """Return the node of a cube root as sign and size, the size continued in switching functions as a root."""
+        builder = self.builder
+        third, size = builder.constant(1.0 / 3.0), self.absolute(argument)
+        for inner in (size, argument, builder.unary("negative", argument)):
+            inside = builder.unary("not negative", inner)
+            self._continued[builder.binary("power", inner, third)] = builder.binary("power", inside, third)
+        root = builder.binary("power", size, third)
+        builder.declare_not_negative(root)
+        return builder.binary("multiply", self.sign(argument), root)
 
     def _switches_at(self, node: int) -> bool:
         """Whether the sign of an expression is that of one surface."""
