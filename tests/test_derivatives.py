@@ -362,7 +362,7 @@ def test_a_run_that_begins_or_ends_at_an_instant_is_named() -> None:
     relay = fl.System(lambda t, x, a: [2.0 - np.sign(x[0] - a)], n=1, params={"a": 3.0})
     assert named(relay.solve((0, 1.5), [0.0], wrt="a")) == []
     assert named(relay.solve((0, 1.0), [0.0], wrt="a")) == [
-        "the run ends at the very time of a switch, which a changed run has earlier or later"
+        "the run ends at the very time of a switch, which a changed run completes earlier or later"
     ]
     # At the zero of an event the run ends by itself.
     stop = fl.Event(lambda t, x, a: x[0] - a, terminal=True)
@@ -396,6 +396,10 @@ def test_a_run_that_begins_or_ends_at_an_instant_is_named() -> None:
             "x[1]",
             0.0,
         ),
+        # Slid on with a multiplier that stays at its end: x = d e^(-t/2) below, and 0 above.
+        (lambda t, x: [-0.5 * x[0] - 2 * np.heaviside(x[0], 0.5)], [0.0], "x[0]", None),
+        # The surface has a kink there: no change of x1 leads to the side whose derivative it is.
+        (lambda t, x: [np.where(x[0] + abs(x[1]) > 0, -2.0, -1.0), 0.1], [0.0, 0.0], "x[1]", None),
     ],
 )
 def test_a_start_whose_sides_differ_is_named(fun: Any, y0: Any, surface: str, slope: float | None) -> None:
@@ -404,6 +408,32 @@ def test_a_start_whose_sides_differ_is_named(fun: Any, y0: Any, surface: str, sl
     assert surface in sol.warnings[-1].surfaces
     if slope is not None:
         assert sol.derivative()[-1, 0] == pytest.approx(slope)
+
+
+@pytest.mark.filterwarnings("ignore:(one_sided|no_derivative):filippov.FilippovWarning")
+def test_a_change_that_an_action_puts_beside_the_surface_slid_on_comes_to_it_along_the_field() -> None:
+    def fun(t: float, x: Any, p: float) -> list[Any]:
+        return [1.0 + 2.0 * np.sign(x[1]), -np.sign(x[1])]
+
+    put = fl.Reset(times=[1.0], map=lambda t, x, p: [x[0], p - 0.3])
+    system = fl.System(fun, n=2, params={"p": 0.3}, resets=[put])
+    sol = system.solve((0.0, 1.5), [0.0, 0.5], wrt=["p", "y0"], **TIGHT)
+    # x[1] = d behind the action takes the time |d| to zero, in which x[0] moves by 2 d more.
+    np.testing.assert_allclose(sol.derivative(), [[2.0, 1.0, 2.0], [0.0, 0.0, 0.0]], atol=1e-12)
+    assert sol.warnings == []
+    _, found = fl.gradient(
+        system, (0.0, 1.5), [0.0, 0.5], terminal=lambda t, y: y[0], wrt=["p", "y0"], **TIGHT
+    )
+    np.testing.assert_allclose([*found.values()], sol.derivative()[0], atol=1e-12)
+    second = system.solve((0.0, 1.5), [0.0, 0.5], wrt=["p"], order=2, **TIGHT)
+    assert [warning.code for warning in second.warnings] == ["no_derivative"]
+    # At the time of the action itself a changed run is still beside the surface.
+    ends = system.solve((0.0, 1.0), [0.0, 0.5], wrt=["p"], **TIGHT)
+    assert [warning.message.split(":")[0] for warning in ends.warnings] == [
+        "the run ends at the very time of a switch, which a changed run completes earlier or later"
+    ]
+    with pytest.warns(fl.FilippovWarning, match="the gradient at its end is that of one side"):
+        fl.gradient(system, (0.0, 1.0), [0.0, 0.5], terminal=lambda t, y: y[0], wrt=["p"])
 
 
 def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:

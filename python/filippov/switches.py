@@ -661,7 +661,7 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
     if starts_at_tick:
         borders.append(Border("starts at the very time of a tick", "by the start"))
     if ends_at_instant and ends_at_given_time:
-        what = "ends at the very time of a switch, which a changed run has earlier or later"
+        what = "ends at the very time of a switch, which a changed run completes earlier or later"
         borders.append(Border(what, "at its end", is_end=True))
     return borders
 

@@ -444,11 +444,12 @@ impl<'w> Walk<'w> {
         let kinds: Vec<Column> = states.chain(parameters).collect();
         let mut columns = extended.columns_at_start(&kinds, &[]);
         let dt: Vec<f64> = columns.iter().map(|c| dot(&last.time, c)).collect();
-        for column in &mut columns {
-            let changes = passages.iter().flat_map(|passage| &passage.changes);
-            changes.for_each(|change| change.apply(extended.n, column));
+        let mut arrives = false;
+        for passage in passages {
+            arrives |= passage.apply(extended.n, &mut columns);
         }
-        let landed = surfaces_landed_on(after, record, &dt, &columns)?;
+        self.borders.ends_at_instant |= arrives && record.t[1] == self.run.solution.t_last;
+        let landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;
         if !landed.is_empty() {
             self.borders.lands_on = Some((record.t[1], landed));
         }

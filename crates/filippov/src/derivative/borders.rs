@@ -20,7 +20,7 @@ pub struct Borders {
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
     pub starts_at_tick: bool,
-    /// The last instant is at the end, and a changed run has it later: all derivatives there.
+    /// The last instant is at the end, and a changed run has it later, or is then beside a surface slid on: all derivatives there.
     pub ends_at_instant: bool,
 }
 
@@ -44,12 +44,13 @@ pub(super) fn is_missed_later(
 }
 
 /// The surfaces on which actions put the state, and at which the sides differ for one of these columns behind the actions; `dt` are the
-/// derivatives of their time.
+/// derivatives of their time, and `arrives` states that one of the columns was beside the surfaces slid on before it came to them.
 pub(super) fn surfaces_landed_on(
     piece: &mut Piece,
     record: &InstantRecord,
     dt: &[f64],
     columns: &[Vec<f64>],
+    arrives: bool,
 ) -> Result<Vec<usize>, FieldError> {
     if record.acts.is_empty() {
         return Ok(Vec::new());
@@ -64,6 +65,11 @@ pub(super) fn surfaces_landed_on(
     };
     let moved: Vec<_> = dt.iter().zip(columns).map(moved).collect();
     let mut found = surfaces_with_sides(piece, (t, &z), &moved)?;
+    if arrives && slides_by_sides(piece, (t, &z))? {
+        found.extend_from_slice(&piece.sliding);
+        found.sort_unstable();
+        found.dedup();
+    }
     // What an action happens on is met by a changed run too.
     let own = |act: &Act| piece.extended.surface_of(act.index);
     let own: Vec<usize> = record.acts.iter().filter_map(own).collect();
@@ -87,8 +93,14 @@ pub(super) fn surfaces_at_start(
     surfaces_with_sides(piece, at, &moved)
 }
 
-/// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces that the motion leaves where the field jumps, or does not leave where its derivative jumps; and those
-/// that it slides on, if the way there is another one from each corner.
+/// Does a motion come to the surfaces slid on by another way from each corner, or leave them on one side?
+fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, FieldError> {
+    Ok(!piece.sliding.is_empty() && (!piece.is_affine || piece.stays_at_an_end(t, z)?))
+}
+
+/// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces
+/// that the motion leaves where the field jumps, or does not leave where its derivative jumps; those that it slides on, if the way there
+/// has sides; and those at which another one of them has a kink.
 fn surfaces_with_sides(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
@@ -96,7 +108,8 @@ fn surfaces_with_sides(
 ) -> Result<Vec<usize>, FieldError> {
     let h = piece.surfaces(t, z)?;
     let field = piece.rates(t, z)?;
-    let mut found = Vec::new();
+    let slides_by_sides = slides_by_sides(piece, (t, z))?;
+    let (mut found, mut others) = (Vec::new(), Vec::new());
     for (j, h) in h.iter().enumerate() {
         let size = {
             let place = piece.at(t, z);
@@ -116,7 +129,7 @@ fn surfaces_with_sides(
             continue;
         }
         let has_sides = match piece.mode.entries()[j] {
-            0 => piece.sliding.contains(&j) && !piece.is_affine,
+            0 => piece.sliding.contains(&j) && slides_by_sides,
             _ => {
                 let system = &piece.extended.system;
                 system.jumps_across(j, &piece.signs, &piece.sliding)
@@ -124,11 +137,28 @@ fn surfaces_with_sides(
                         && bends_across(piece, j, (t, z), &normal)?)
             }
         };
-        if has_sides {
-            found.push(j);
+        match has_sides {
+            true => found.push((j, normal)),
+            false => others.push(j),
         }
     }
-    Ok(found)
+    let mut all: Vec<usize> = found.iter().map(|(j, _)| *j).collect();
+    for k in others {
+        let side = piece.signs[k];
+        piece.signs[k] = -side;
+        let mut has_kink = false;
+        for (j, normal) in &found {
+            let mut beyond = vec![0.0; z.len()];
+            piece.gradient(*j, t, z, &mut beyond)?;
+            has_kink |= differ(normal, &beyond);
+        }
+        piece.signs[k] = side;
+        if has_kink {
+            all.push(k);
+        }
+    }
+    all.sort_unstable();
+    Ok(all)
 }
 
 /// Does a motion with this velocity stay on a surface, as far as the first two derivatives say?

@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use super::borders::differ;
 use super::change::{Change, Row, Rows};
 use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
@@ -88,6 +89,26 @@ pub(super) struct Passage {
     pub goes_on: bool,
     /// So many of its actions are recorded as switches, where others happen at the same time.
     pub n_recorded: usize,
+    /// The last change is what brings a state that actions put beside the surfaces slid on to them, a little later.
+    pub arrives: bool,
+}
+
+impl Passage {
+    /// What becomes of changes of the extended state. Returns whether actions put one of them beside the surfaces slid on.
+    pub fn apply(&self, n: usize, columns: &mut [Vec<f64>]) -> bool {
+        let first = self.changes.len() - usize::from(self.arrives);
+        let (own, arrival) = self.changes.split_at(first);
+        let mut is_beside = false;
+        for column in columns {
+            own.iter().for_each(|change| change.apply(n, column));
+            for change in arrival {
+                let before = column.clone();
+                change.apply(n, column);
+                is_beside |= differ(&before, column);
+            }
+        }
+        is_beside
+    }
 }
 
 impl Instant<'_, '_> {
@@ -114,6 +135,7 @@ impl Instant<'_, '_> {
             changes: SmallVec::new(),
             goes_on: self.leaves_as_it_is(),
             n_recorded: 0,
+            arrives: false,
         };
         if passage.goes_on {
             return Ok(Ok(passage));
@@ -139,11 +161,19 @@ impl Instant<'_, '_> {
         passage.changes.push(jump);
         let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
+        let arrival = match record.acts.is_empty() {
+            true => None,
+            false => arrival(self.after, record.t[1], &z)?,
+        };
+        passage.arrives = arrival.is_some();
         let kept = match record.acts.is_empty() {
             true => &self.before.sliding[..],
             false => &[],
         };
-        let held = self.after.projection(kept, record.t[1], &z)?;
+        let held = match arrival {
+            None => self.after.projection(kept, record.t[1], &z)?,
+            known => known,
+        };
         passage.changes.extend(held);
         Ok(Ok(passage))
     }
@@ -314,8 +344,8 @@ pub(super) fn entered(
     Ok(Some(new.taken_out(n)))
 }
 
-/// What becomes of a change at a start on surfaces that the motion slides on: a start beside them comes to them at once. `None` if it
-/// slides on none.
+/// What becomes of a change at a start on surfaces that the motion slides on, or where an action puts it on them: a start beside them
+/// comes to them at once. `None` if it slides on none.
 pub(super) fn arrival(piece: &Piece, t: f64, z: &[f64]) -> Result<Option<Change>, FieldError> {
     if piece.sliding.is_empty() {
         return Ok(None);

@@ -34,6 +34,8 @@ pub struct InstantDerivative {
     /// At an impact without speed: by how much the state behind differs from the undisturbed motion, for each unit of the root of the
     /// depth that this would reach.
     pub square_root: Vec<f64>,
+    /// Do actions put a changed state beside the surfaces slid on, to which it comes a little later?
+    pub(super) arrives: bool,
 }
 
 impl InstantDerivative {
@@ -49,6 +51,7 @@ impl InstantDerivative {
             lost: None,
             sides: Vec::new(),
             square_root: Vec::new(),
+            arrives: false,
         }
     }
 
@@ -106,8 +109,10 @@ impl Instant<'_, '_> {
             found.second_dt.clone_from(&second_dt);
             let dt = columns.iter().map(|column| dot(&passage.time, column));
             found.dt.extend(dt);
-            for column in columns.iter_mut() {
-                passage.changes.iter().for_each(|one| one.apply(n, column));
+            found.arrives = passage.apply(n, columns);
+            if found.arrives {
+                *second = None;
+                found.second_dt.clear();
             }
             (found.saltation, found.by_parameters) = matrices(&passage.changes, (n, m));
             let is_finite = columns.iter().flatten().all(|v| v.is_finite());
@@ -157,6 +162,7 @@ impl Instant<'_, '_> {
                         changes: cones.swap_remove(0).changes,
                         goes_on: false,
                         n_recorded: 0,
+                        arrives: false,
                     }]));
                 }
             }
@@ -168,6 +174,7 @@ impl Instant<'_, '_> {
                 changes: SmallVec::new(),
                 goes_on: true,
                 n_recorded: 0,
+                arrives: false,
             }]));
         }
         Ok(Err(lost))

@@ -6,6 +6,7 @@
 
 use super::extended::{Column, Extended};
 use super::forms::{add, pairs, Moved, Second};
+use super::instant::arrival;
 use super::piece::Piece;
 use crate::error::FieldError;
 use crate::motion::Guard;
@@ -147,7 +148,15 @@ impl SecondOrder<'_, '_> {
         let graph = self.extended.system.graph();
         let is_plane = |&j: &usize| graph.is_affine(graph.clone().surface(j as u32));
         if after.sliding.iter().all(is_plane) {
-            if let Some(held) = after.projection(&[], record.t[1], &z_after)? {
+            let arrival = match record.acts.is_empty() {
+                true => None,
+                false => arrival(after, record.t[1], &z_after)?,
+            };
+            let held = match arrival {
+                None => after.projection(&[], record.t[1], &z_after)?,
+                known => known,
+            };
+            if let Some(held) = held {
                 for mixed in &mut found {
                     let mut padded = pad(mixed);
                     held.apply(n, &mut padded);

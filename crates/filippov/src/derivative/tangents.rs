@@ -305,14 +305,17 @@ impl<'a> Tangents<'a> {
             }
             let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
             let mut pairs = self.columns_before.iter().zip(&self.columns).enumerate();
-            self.found.borders.ends_at_instant =
-                pairs.any(|(c, (before, after))| is_timed(c) && differ(before, after));
+            self.found.borders.ends_at_instant = pairs
+                .any(|(c, (before, after))| is_timed(c) && differ(before, after))
+                || all.iter().any(|found| found.arrives);
             let start = self.t_start.unwrap_or(record.t[0]);
             self.found.borders.starts_at_action |=
                 is_missed_later(self.around.extended, record, start, &self.kinds);
             if let (None, None, Some(last)) = (&self.found.borders.lands_on, self.lost, all.last())
             {
-                let landed = surfaces_landed_on(&mut after, record, &last.dt, &self.columns)?;
+                let arrives = all.iter().any(|found| found.arrives);
+                let columns = &self.columns;
+                let landed = surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
             }
