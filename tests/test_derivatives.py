@@ -541,3 +541,20 @@ def test_random_systems_against_differences(first: int) -> None:
         n_unsettled += len(found.unsettled)
     assert n_columns > 180
     assert n_unsettled < 6
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        7261630,  # a start on a surface slid on, whose multiplier stays at its end
+        7261859,  # an action at the end puts the state on a surface slid on
+        1126401,  # a start at the kink of a surface
+        9240021,  # a start on a surface that moves away at a tick
+        9252182,  # changes that are zero but for rounding while two surfaces are slid on
+    ],
+)
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_random_systems_with_rare_instants(seed: int) -> None:
+    found = compare(seed)
+    assert not found.wrong
+    assert found.n_columns >= 3

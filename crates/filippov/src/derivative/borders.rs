@@ -231,10 +231,16 @@ pub(super) fn ticks_at_start(
     let q = extended.discrete_before(t, (&z[..extended.n], &piece.q))?;
     let mut earlier = Piece::new(around, &piece.mode, &q);
     let system = &extended.system;
-    for (j, h) in earlier.surfaces(t, z)?.iter().enumerate() {
+    let now = piece.surfaces(t, z)?;
+    for (j, (h, now)) in earlier.surfaces(t, z)?.iter().zip(&now).enumerate() {
         let side = f64::from(piece.mode.entries()[j]);
-        let is_elsewhere = h * side < 0.0 || side == 0.0;
-        if is_elsewhere && h.abs() > AT_SIDE * system.surface_size(j, &earlier.at(t, z))? {
+        let size = AT_SIDE * system.surface_size(j, &earlier.at(t, z))?;
+        // On the surface before the tick, a start a little earlier is on either side.
+        let is_elsewhere = match h.abs() > size {
+            true => h * side < 0.0 || side == 0.0,
+            false => now.abs() > size && system.jumps_across(j, &earlier.signs, &earlier.sliding),
+        };
+        if is_elsewhere {
             return Ok(true);
         }
     }

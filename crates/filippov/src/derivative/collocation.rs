@@ -136,11 +136,7 @@ impl Collocation {
         self.way = Way::Sparse(false);
         self.units.fill(1.0);
         if self.n <= MOST_FULL {
-            for (r, unit) in self.units.iter_mut().enumerate() {
-                let largest = columns.iter().fold(0.0_f64, |most, c| most.max(c[r].abs()));
-                *unit = power_of_two_below(largest);
-            }
-            if let Some(elimination) = self.factor_full(nodes) {
+            if let Some(elimination) = self.factor_full(nodes, columns) {
                 self.way = Way::Full(Box::new(elimination));
                 return;
             }
@@ -261,14 +257,22 @@ impl Collocation {
 
     /// The full matrix, with the multipliers eliminated; `None` where they have no solution. Its rows, and its unknowns, are divided by
     /// powers of two: no digit is lost, and pivots are chosen well where states are of very different size.
-    fn factor_full(&mut self, nodes: &[Linearisation]) -> Option<Elimination> {
+    fn factor_full(
+        &mut self,
+        nodes: &[Linearisation],
+        columns: &[Vec<f64>],
+    ) -> Option<Elimination> {
         let (n, m, dt) = (self.n, self.m, self.dt);
         let n_multipliers = nodes[0].rows().n_rows() - n - m;
         self.right.clear(n + m);
         let mut matrix = Matrix::zeros(STAGES * n);
-        let mut slopes = vec![0.0; n * (n + m)];
-        for (i, node) in nodes.iter().enumerate() {
-            eliminated(node.rows(), (n, m, n_multipliers), &mut slopes)?;
+        let size = n * (n + m);
+        let mut all = vec![0.0; STAGES * size];
+        for (node, slopes) in nodes.iter().zip(all.chunks_exact_mut(size)) {
+            eliminated(node.rows(), (n, m, n_multipliers), slopes)?;
+        }
+        self.units = units(&all, (n, m, dt), columns);
+        for (i, slopes) in all.chunks_exact(size).enumerate() {
             let sum: f64 = WEIGHTS[i].iter().sum();
             for r in 0..n {
                 let row = &slopes[r * (n + m)..][..n + m];
@@ -332,6 +336,30 @@ impl Collocation {
         }
         matrix.is_finite() && self.sparse.factor(&matrix).is_ok()
     }
+}
+
+/// In what changes of n states are measured over a part of this length, by their derivatives at the nodes: the size that each state has
+/// at the start, or comes to on the way. A state that is zero but for rounding is not measured by that where others act on it.
+fn units(slopes: &[f64], (n, m, dt): (usize, usize, f64), columns: &[Vec<f64>]) -> Vec<f64> {
+    let width = n + m;
+    let mut largest = vec![0.0_f64; n * width];
+    for node in slopes.chunks_exact(n * width) {
+        let entries = largest.iter_mut().zip(node);
+        entries.for_each(|(most, slope)| *most = most.max((dt * slope).abs()));
+    }
+    let at_start = |r: usize| columns.iter().fold(0.0_f64, |most, c| most.max(c[r].abs()));
+    let mut sizes: Vec<f64> = (0..width).map(at_start).collect();
+    for _ in 0..n {
+        for r in 0..n {
+            let row = &largest[r * width..][..width];
+            let others = row.iter().zip(&sizes).enumerate();
+            let others = others.filter(|(c, _)| *c != r);
+            let share = others.fold(0.0_f64, |most, (_, (slope, size))| most.max(slope * size));
+            sizes[r] = sizes[r].max(share / (1.0 + row[r]));
+        }
+    }
+    let states = sizes[..n].iter();
+    states.map(|size| power_of_two_below(*size)).collect()
 }
 
 /// The largest power of two that is not above a positive normal number; 1 for others.
