@@ -161,6 +161,8 @@ def changes(of: Callable[[Any], Any], t: Any, h: Any) -> list[Any]:
 def places(of: Callable[[Any], Any]) -> list[float]:
     """Return where a function of the time changes its sign, jumps through zero, or touches it on the way."""
     t = np.linspace(0.0, END, CELLS + 1)
+    # A root of the time is steep at its start.
+    t = np.r_[0.0, np.geomspace(1e-13, t[1], 64)[:-1], t[1:]]
     h = of(t)
     # A dip towards zero between two points of the grid is looked at on a grid of its own, and is a place
     # itself: a touch.

@@ -326,7 +326,7 @@ impl Tracer {
             return Ok(self.binary(BinaryOp::Mul, sign, node));
         }
         if self.pieces(node, false)?.is_none() && !self.is_stepwise(node) {
-            self.switch_as_surface(node);
+            self.switch_as_surface(node, node);
             return Ok(self.graph.abs(node));
         }
         let opposite = self.unary(UnaryOp::Neg, node);
@@ -340,8 +340,8 @@ impl Tracer {
         second: NodeId,
         is_largest: bool,
     ) -> Result<NodeId, Refused> {
-        let difference = self.binary(BinaryOp::Sub, first, second);
-        let difference = self.graph.without_cancelled(difference);
+        let whole = self.binary(BinaryOp::Sub, first, second);
+        let difference = self.graph.without_cancelled(whole);
         if let Some(known) = self.sign_everywhere(difference)? {
             return Ok(if (known >= 0.0) == is_largest {
                 first
@@ -351,7 +351,7 @@ impl Tracer {
         }
         let is_plain = self.pieces(difference, false)?.is_none() && !self.is_stepwise(difference);
         if is_plain && !self.is_constant_of_motion(difference) {
-            self.switch_as_surface(difference);
+            self.switch_as_surface(whole, difference);
             return Ok(match is_largest {
                 true => self.graph.maximum(first, second),
                 false => self.graph.minimum(first, second),
@@ -671,8 +671,9 @@ impl Tracer {
         node
     }
 
-    fn switch_as_surface(&mut self, node: NodeId) {
-        let surface = self.as_surface(node);
+    /// Lets an expression switch where the same one does, written in another way, with its roots continued.
+    fn switch_as_surface(&mut self, node: NodeId, same: NodeId) {
+        let surface = self.as_surface(same);
         if surface != node {
             self.graph.switch_as(node, surface);
         }

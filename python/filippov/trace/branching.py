@@ -288,19 +288,20 @@ class Tracer:
         if self.is_constant_of_motion(node):
             return self.builder.binary("multiply", self.laws.sign(self, node), node)
         if self.pieces(node) is None and not self.is_stepwise(node):
-            self.switch_as_surface(node)
+            self.switch_as_surface(node, node)
             return self.builder.abs(node)
         return self.choose(node, node, self.builder.unary("negative", node))
 
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
-        difference = self.builder.without_cancelled(self.builder.binary("subtract", first, second))
+        whole = self.builder.binary("subtract", first, second)
+        difference = self.builder.without_cancelled(whole)
         known = self.sign_everywhere(difference)
         if known is not None:
             return first if (known >= 0.0) == largest else second
         is_plain = self.pieces(difference) is None and not self.is_stepwise(difference)
         if is_plain and not self.is_constant_of_motion(difference):
-            self.switch_as_surface(difference)
+            self.switch_as_surface(whole, difference)
             return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
         return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
 
@@ -510,9 +511,9 @@ class Tracer:
                 break
         return node
 
-    def switch_as_surface(self, node: int) -> None:
-        """Let an expression switch where it does with its roots continued."""
-        surface = self.as_surface(node)
+    def switch_as_surface(self, node: int, same: int) -> None:
+        """Let an expression switch where the same one does, written in another way, with its roots continued."""
+        surface = self.as_surface(same)
         if surface != node:
             self.builder.switch_as(node, surface)
 
