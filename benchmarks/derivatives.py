@@ -3,12 +3,14 @@
 Run ``python benchmarks/derivatives.py``; the table also goes into ``README.md`` unless ``--no-write``. Costs
 are instructions of a warmed call, counted by callgrind, Python included; without valgrind they are times.
 Beside them are central differences of runs, two for each column. The runs that a gradient is compared with
-are those of version 0.1.0, whose counts were 618,000 and 19.6 million instructions.
+are those of version 0.1.0, whose counts were 618,000 and 19.6 million instructions. If CasADi is installed,
+four columns of the transient are also timed beside the loop of `loop_cvodes` and beside central differences.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -25,12 +27,17 @@ CHAIN_RUN = 19.6e6
 COUNTED = 10
 
 
-def transient() -> dict[str, Callable[[], Any]]:
-    """Return runs of the dry-friction transient without derivatives, and with one to four columns."""
-    system = fl.System(
+def oscillator() -> fl.System:
+    """Return the oscillator with dry friction."""
+    return fl.System(
         lambda t, x, F=0.4, omega=1 / 3: [x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])],
         states=("y", "v"),
     )
+
+
+def transient() -> dict[str, Callable[[], Any]]:
+    """Return runs of the dry-friction transient without derivatives, and with one to four columns."""
+    system = oscillator()
 
     def run(*wrt: str) -> fl.Solution:
         more = {"wrt": wrt} if wrt else {}
@@ -42,6 +49,52 @@ def transient() -> dict[str, Callable[[], Any]]:
         "2": lambda: run("y0"),
         "4": lambda: run("y0", "F", "omega"),
     }
+
+
+def beside_cvodes() -> list[Line]:
+    """Return the times of four columns beside those of CVODES and of central differences, with errors."""
+    if importlib.util.find_spec("casadi") is None:
+        print("casadi is not installed: the loop around CVODES is left out")
+        return []
+    import loop_cvodes
+
+    names = ("y", "v", "F", "omega")
+    system = oscillator()
+    options: dict[str, Any] = {"method": "Taylor", "rtol": 1e-9, "atol": 1e-9}
+    values = {"y": 1.0, "v": 2.0, "F": 0.4, "omega": 1 / 3}
+
+    def end(**moved: float) -> Any:
+        point = values | moved
+        params = {name: point[name] for name in names[2:]}
+        start = [point["y"], point["v"]]
+        return system.solve((0, 60 * math.pi), start, params, keep="last", **options).y[:, -1]
+
+    def differences() -> Any:
+        d = 1e-4
+        pairs = [(end(**{k: values[k] + d}), end(**{k: values[k] - d})) for k in names]
+        return np.array([(above - below) / (2 * d) for above, below in pairs]).T
+
+    def own(tolerance: float = 1e-9) -> Any:
+        tolerances = {"rtol": tolerance, "atol": tolerance}
+        asked = {**options, **tolerances, "wrt": ["y0", "F", "omega"]}
+        return system.solve((0, 60 * math.pi), [1.0, 2.0], **asked).derivative()
+
+    loop = loop_cvodes.transient((1.0, 2.0), 60 * math.pi, 0.4, 1 / 3, 1e-9)
+    calls = {"own": own, "cvodes": loop, "differences": differences}
+    found = {"own": own(), "cvodes": loop()[1], "differences": differences()}
+    known = own(1e-13)
+    errors = {name: np.abs(value - known).max() / np.abs(known).max() for name, value in found.items()}
+    times = {name: float(np.median(taken)) for name, taken in interleaved(calls, 5).items()}
+    return [
+        Line(
+            f"transient, 4 columns: {what}",
+            times["own"] / times[name],
+            1.0,
+            detail=f"{1e3 * times['own']:.3g} ms, error {errors['own']:.1e}; "
+            f"{1e3 * times[name]:.3g} ms, error {errors[name]:.1e}",
+        )
+        for name, what in (("cvodes", "a loop around CVODES"), ("differences", "central differences"))
+    ]
 
 
 def chain_of_parameters() -> dict[str, Callable[[], Any]]:
@@ -134,6 +187,7 @@ def main() -> None:
             detail=f"{found['gradient']:.3g} {unit}; a run {found['run']:.3g}",
         )
     )
+    lines += beside_cvodes()
     text = report("Derivatives", lines)
     if not arguments.no_write:
         write_section("derivatives", text)
