@@ -481,7 +481,7 @@ class Tracer:
         return [builder.substituted(component, images) for component in field] if images else field
 
     def _cube_root_by_sign(self, argument: int) -> int:
-        """Return the node of a cube root as sign and size, the size continued in switching functions as a root."""
+        """Return a cube root as sign and size; in switching functions the size is continued as a root."""
         builder = self.builder
         third, size = builder.constant(1.0 / 3.0), self.absolute(argument)
         for inner in (size, argument, builder.unary("negative", argument)):
@@ -512,7 +512,7 @@ class Tracer:
         return node
 
     def switch_as_surface(self, node: int, same: int) -> None:
-        """Let an expression switch where the same one does, written in another way, with its roots continued."""
+        """Let an expression switch where the same one does in another form, with its roots continued."""
         surface = self.as_surface(same)
         if surface != node:
             self.builder.switch_as(node, surface)
