@@ -29,16 +29,19 @@ class Wanted(NamedTuple):
         The places of the parameters among all of the system.
     order : int
         The order of the derivatives; 0 for a run that is kept for gradients of costs.
+    memory : int or None
+        How many bytes the record of such a run may take; any number if None.
     """
 
     names: tuple[str, ...]
     columns: list[tuple[int, int]]
     parameters: list[int]
     order: int = 1
+    memory: int | None = None
 
-    def for_core(self) -> tuple[list[tuple[int, int]], list[int], int]:
+    def for_core(self) -> tuple[list[tuple[int, int]], list[int], int, int | None]:
         """Return what the core takes."""
-        return self.columns, self.parameters, self.order
+        return self.columns, self.parameters, self.order, self.memory
 
 
 class Back(NamedTuple):
@@ -48,9 +51,12 @@ class Back(NamedTuple):
     ----------
     wrt : str or sequence of str
         By what is differentiated.
+    memory : int or None
+        How many bytes the record of the run may take; any number if None.
     """
 
     wrt: Any
+    memory: int | None = None
 
 
 def check_wrt(
@@ -84,7 +90,7 @@ def check_wrt(
     if order not in (1, 2) or isinstance(order, bool):
         raise InputError(f"order: derivatives are of order 1 or 2, not {order!r}")
     if isinstance(wrt, Back):
-        return check_wrt(wrt.wrt, states, params, discrete)._replace(order=0)
+        return check_wrt(wrt.wrt, states, params, discrete)._replace(order=0, memory=wrt.memory)
     names = [wrt] if isinstance(wrt, str) else wrt
     if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(

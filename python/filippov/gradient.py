@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -53,6 +53,7 @@ def gradient(
     instants: Sequence[tuple[Any, Cost]] = (),
     wrt: str | Sequence[str] = "params",
     events: Any = None,
+    memory: int = 2**28,
     **options: Any,
 ) -> tuple[float, dict[str, float]]:
     """Return a cost of a run, and its gradient, by one run forward and the adjoint equations back.
@@ -81,6 +82,10 @@ def gradient(
         As for `solve_ivp`: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` (default), ``"all"``.
     events : optional
         As for `solve_ivp`. If one of them ends the run, T is its time, and moves with the parameters.
+    memory : int, optional
+        How many bytes the record of the run may take, 256 MB by default. A run that would need more is
+        repeated piece by piece on the way back, from checkpoints: its gradient is the same to the bit. Zeros
+        of events, and states at the instants of costs, are kept in any case.
     **options
         Other options of `solve_ivp`, for example ``rtol``.
 
@@ -94,10 +99,10 @@ def gradient(
     Raises
     ------
     InputError
-        If a cost is no function or does not return one finite number, a name is unknown, or the system or a
-        cost is not traced.
+        If a cost is no function or does not return one finite number, a name is unknown, the system or a
+        cost is not traced, or `memory` is too small for two checkpoints.
     ModelError
-        If the run fails; ``partial`` is the part that was computed.
+        If the run fails; ``partial`` is the part that was computed, its last state if `memory` was exceeded.
 
     References
     ----------
@@ -115,6 +120,7 @@ def gradient(
     (1.0, -2.0)
     """
     own, parts = _checked(system, terminal, running, instants, events, options)
+    memory = _bytes_of(memory)
     t0, t1 = check_t_span(t_span)
     if t0 == t1:
         raise InputError("t_span: a run of no length has no gradient")
@@ -130,12 +136,13 @@ def gradient(
     if running is not None:
         followed = _with_running_cost(system, running, n)
         final = _with_integral(terminal, n)
+        parts = [part._replace(cost=_cost_of_first(part.cost, n)) for part in parts]
         start = np.append(start, 0.0)
         if np.ndim(options.get("atol", 0.0)):
             options["atol"] = np.append(options["atol"], np.min(options["atol"]))
     own_parts = (part.event for part in parts if part.event is not None)
     watched = [_of_first(event, n) for event in (*own, *own_parts)]
-    more = {"events": watched, "wrt": Back(wrt), "dense_output": True, **options}
+    more = {"events": watched, "wrt": Back(wrt, memory), "dense_output": True, **options}
     try:
         sol = followed.solve((t0, t1), start, params, **more)
     except TraceError:
@@ -145,7 +152,7 @@ def gradient(
     if not sol.success:
         raise ModelError(sol.message, partial=sol)
 
-    total = _Sum(sol, values, n)
+    total = _Sum(sol, values, n, t0)
     if final is not None:
         ends = (watched[k].g for k in range(len(own)) if _has_ended(sol, k))
         total.add_at_end("terminal", final, next(ends, None))
@@ -160,13 +167,21 @@ def gradient(
         else:
             for t in part.times:
                 total.add(part.name, part.cost, float(t))
-    found, lost, borders = total.gradient()
+    value, found, lost, borders = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
     for border in borders_of(borders, sol.status == 0, sol.surfaces):
         warn_user([f"the run {border.what}: the gradient {border.whose} is that of one side"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
-    return total.value, {name: entry for name, entry in entries if name != _RUNNING}
+    return value, {name: entry for name, entry in entries if name != _RUNNING}
+
+
+def _bytes_of(memory: Any) -> int:
+    """Return how many bytes a record may take; refuse what is no number of them."""
+    is_number = isinstance(memory, (int, np.integer)) and not isinstance(memory, bool)
+    if not is_number or memory <= 0:
+        raise InputError(f"memory: a positive number of bytes is needed, an integer, not {memory!r}")
+    return min(int(memory), 2**62)
 
 
 class _Part(NamedTuple):
@@ -250,6 +265,11 @@ def _of_first(event: Event, n: int) -> Event:
     return Event(g, event.direction, event.terminal, event.name)
 
 
+def _cost_of_first(cost: Cost, n: int) -> Cost:
+    """Return a cost as a function of a state that begins with `n` components of its own."""
+    return lambda t, y, **params: cost(t, y[:n], **_named(cost, params))
+
+
 def _with_integral(terminal: Cost | None, n: int) -> Cost:
     """Return the cost at the end with the integral of the running cost, which is state `n`."""
 
@@ -312,28 +332,33 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
 class _Sum:
     """A cost, term by term."""
 
-    def __init__(self, sol: Solution, values: Mapping[str, float], n: int) -> None:
-        self.value = 0.0
-        self._sol, self._values, self._n = sol, values, n
+    def __init__(self, sol: Solution, values: Mapping[str, float], n: int, t0: float) -> None:
+        assert isinstance(sol._run, Run)
+        self._sol, self._values, self._n, self._t0 = sol, values, n, t0
+        self._run, self._names = sol._run, tuple(sol._origin.system.discrete)
+        self._at_end: list[float] = []
         self._terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]] = []
+        self._costs: list[tuple[str, Cost]] = []
         self._traced: dict[Cost, TracedSystem | str] = {}  # or what kept it from that
 
     def add(self, name: str, cost: Cost, t: float, zero: Cost | None = None) -> None:
         """Add a function at a time, that of a zero of another function if this is given."""
-        first, last = float(self._sol.t[0]), float(self._sol.t[-1])
+        first, last = self._t0, float(self._sol.t[-1])
         if not first <= t <= last:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
-        self._add_value(name, cost, t)
         known = None if zero is None else self._trace(name, zero)
         function = self._trace(name, cost, None if zero is not None else t)
         self._terms.append((function, t, None, known))
+        self._costs.append((name, cost))
 
     def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
         """Add a function at the end of the run, which is at a zero of another function if this is given."""
-        values = self._values_at(self._sol.t[-1], False)
-        self.value += _number(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, values)), name)
+        t, y = self._sol.t[-1], self._sol.y[:, -1]
+        held = self._run.discrete(np.array([t]), len(self._names), False)[:, 0] if self._names else ()
+        self._at_end.append(self._value_of((name, cost), t, y, held))
         known = None if zero is None else self._trace(name, zero)
         self._terms.append((self._trace(name, cost), None, None, known))
+        self._costs.append((name, cost))
 
     def add_at_surface(self, name: str, cost: Cost, surface: str) -> None:
         """Add a function at all switches that a surface brings about."""
@@ -342,28 +367,28 @@ class _Sum:
             hint = did_you_mean(surface, surfaces)
             raise InputError(f"{name}: there is no surface {surface!r}{hint}; the surfaces are {surfaces}")
         place = surfaces.index(surface)
-        for switch in self._sol.switches:
-            if switch.surfaces[:1] == (place,):
-                self._add_value(name, cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
+        self._costs.append((name, cost))
 
-    def gradient(self) -> tuple[Array, tuple[float, str] | None, Borders]:
-        """Return the gradient by the columns, where and why there is none, and where it has sides."""
-        run = self._sol._run
-        assert isinstance(run, Run)
-        return run.cost_gradient(self._terms)
+    def gradient(self) -> tuple[float, Array, tuple[float, str] | None, Borders]:
+        """Return the sum, its gradient by the columns, where and why it is lost, and where it has sides."""
+        try:
+            found, lost, borders, points = self._run.cost_gradient(self._terms)
+        except ValueError as error:
+            if str(error).startswith("memory: "):
+                raise InputError(str(error)) from None
+            raise
+        value = sum(self._at_end)
+        # The last point of each term comes first.
+        for term, t, x in sorted(reversed(points), key=lambda point: point[0]):
+            y, held = np.split(x, [len(x) - len(self._names)])
+            value += self._value_of(self._costs[term], t, y, held)
+        return value, found, lost, borders
 
-    def _add_value(self, name: str, cost: Cost, t: float) -> None:
-        assert self._sol.sol is not None
-        y = self._sol.sol(t, side="left")
-        self.value += _number(cost(t, y, **_named(cost, self._values_at(t, True))), name)
-
-    def _values_at(self, t: float, is_left: bool) -> dict[str, float]:
-        """Return the values of the parameters, and of the discrete states at a time."""
-        names, run = tuple(self._sol.discrete), self._sol._run
-        assert isinstance(run, Run)
-        held = run.discrete(np.array([t]), len(names), is_left)[:, 0] if names else ()
-        return {**self._values, **dict(zip(names, np.asarray(held).tolist(), strict=True))}
+    def _value_of(self, named: tuple[str, Cost], t: float, y: Array, held: Iterable[float]) -> float:
+        name, cost = named
+        params = {**self._values, **dict(zip(self._names, map(float, held), strict=True))}
+        return _number(cost(t, y, **_named(cost, params)), name)
 
     def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
         """Return a function as an expression. At a known time what it reads of the time is a number."""

@@ -6,17 +6,19 @@ use filippov::derivative::{
     Borders, Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension,
     OneSided, Tangents, Term, Trail, WayBack, When,
 };
-use filippov::{Error, FieldError, Options, Problem, Reached, Side, Solution};
+use filippov::{Error, FieldError, Options, Problem, Reached, ReplayError, Side, Solution};
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::itineraries::{instant_row, TrailRows};
+use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, refused};
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
-/// which is differentiated; and the order of the derivatives, 0 where the run is kept for gradients of costs instead.
-pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
+/// which is differentiated; the order of the derivatives, 0 where the run is kept for gradients of costs instead; and how many bytes
+/// of memory its record may need then.
+pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8, Option<usize>);
 
 /// Time, derivative of the time, saltation matrix, its part by parameters, condition, why derivatives end there, the matrices by
 /// sides, the coefficient of a square root, and the second derivatives of the time.
@@ -62,7 +64,9 @@ pub struct RunDerivatives {
     parameters: Vec<usize>,
     extension: Arc<Extension>,
     options: Options,
-    span: f64,
+    t_span: (f64, f64),
+    /// How many bytes the record of a run that is kept for gradients may need.
+    memory: usize,
     /// How many rows a column has: the states, and the named discrete states behind them.
     n: usize,
 }
@@ -85,8 +89,8 @@ pub fn run_with_derivatives(
         &filippov::action::Actions<'_>,
     ),
     options: &Options,
-    span: f64,
-    (kinds, parameters, order): &Wanted,
+    t_span: (f64, f64),
+    (kinds, parameters, order, memory): &Wanted,
     interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<(Solution, RunDerivatives), Failure> {
     let kinds: Vec<Column> = kinds
@@ -96,11 +100,13 @@ pub fn run_with_derivatives(
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
+    let memory = memory.unwrap_or(usize::MAX);
     let (solution, found, trail) = if *order == 0 {
-        let mut trail = Trail::of(&extended);
-        let solution = problem.solve_observed(&mut trail, interrupt)?;
+        let trail = Trail::of(&extended);
+        let (solution, trail) = problem.solve_with_trail(trail, memory, interrupt)?;
         (solution, Derivatives::default(), Some(trail))
     } else {
+        let span = t_span.1 - t_span.0;
         let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
         if *order == 2 {
             tangents = tangents.with_second();
@@ -113,7 +119,8 @@ pub fn run_with_derivatives(
         RunDerivatives {
             found,
             trail,
-            span,
+            t_span,
+            memory,
             n: extended.n_rows(),
             kinds,
             parameters: parameters.clone(),
@@ -170,6 +177,15 @@ fn column(kind: u8, place: usize) -> Column {
 
 /// The time at which there is no derivative, and why.
 pub type LostAt = (f64, &'static str);
+
+/// The gradient by the columns, where and why there is none, where it is that of one side, and where terms count: the term, the time
+/// and the state before.
+type GradientRow = (
+    Vec<f64>,
+    Option<LostAt>,
+    BordersRow,
+    Vec<(usize, f64, Vec<f64>)>,
+);
 
 /// What a run computed, and its actions.
 type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
@@ -271,14 +287,20 @@ impl RunDerivatives {
         }))
     }
 
-    /// The gradient of a sum of terms, an entry for each column; where and why there is none, if so; and the surfaces that
-    /// the run starts on and leaves.
+    /// Was the record of the run too large, so that gradients repeat it?
+    pub fn is_to_repeat(&self) -> bool {
+        self.trail.as_ref().is_some_and(Trail::is_closed)
+    }
+
+    /// The gradient of a sum of terms, an entry for each column; where and why there is none, if so; the surfaces that the run
+    /// starts on and leaves; and where terms at instants count. A run whose record was too large is repeated.
     pub fn gradient(
         &self,
+        py: Python<'_>,
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
-        terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<LostAt>, BordersRow)> {
+        (prepared, terms): (&PreparedRun, &[TermRow<'_>]),
+    ) -> PyResult<GradientRow> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
@@ -306,17 +328,37 @@ impl RunDerivatives {
                 },
             })
             .collect();
+        let impacts = extended.impacts();
         let way = WayBack {
-            solution,
-            trail,
             systems: (system, &extended),
+            impacts: &impacts,
             kinds: &self.kinds,
             options: &self.options,
-            span: self.span,
+            t_span: self.t_span,
         };
-        let found = way.gradient(&terms).map_err(raised)?;
+        let found = if trail.is_closed() {
+            let options = Options {
+                max_wall_time: None,
+                ..self.options.clone()
+            };
+            let events = prepared.user_events();
+            let problem = prepared.problem(system, self.t_span, (&options, &events, actions));
+            let mut signal = None;
+            let mut interrupt = |_: Reached| {
+                signal = py.check_signals().err();
+                signal.is_some()
+            };
+            let kept = (solution, self.memory);
+            let of = (&way, Trail::of(&extended), &terms[..]);
+            let found = problem.gradient_within(kept, of, &mut interrupt);
+            found.map_err(|error| signal.take().unwrap_or_else(|| not_repeated(error)))?
+        } else {
+            way.gradient((solution, trail), &terms).map_err(raised)?
+        };
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
-        Ok((entries, found.lost, borders_row(&found.borders)))
+        let points = found.points.into_iter();
+        let points = points.map(|point| (point.term, point.t, point.x)).collect();
+        Ok((entries, found.lost, borders_row(&found.borders), points))
     }
 
     /// The derivative of the state at the end; NaN if the run took no step.
@@ -388,6 +430,21 @@ impl RunDerivatives {
                 )
             })
             .collect()
+    }
+}
+
+/// Why there is no gradient of a run that was to be repeated.
+fn not_repeated(error: ReplayError) -> PyErr {
+    match error {
+        ReplayError::Raised(error) => raised(error),
+        ReplayError::Refused(error) => refused(error),
+        ReplayError::TooSmall(needed) => PyValueError::new_err(format!(
+            "memory: this run needs at least {needed} bytes to be repeated piece by piece"
+        )),
+        ReplayError::Interrupted => PyRuntimeError::new_err("the run was interrupted"),
+        ReplayError::Differs => PyRuntimeError::new_err(
+            "memory: the run was repeated and took other steps: does one of its functions keep a state of its own?",
+        ),
     }
 }
 

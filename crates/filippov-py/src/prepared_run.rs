@@ -121,16 +121,12 @@ impl PreparedRun {
             return Err(Failure::CalledMap);
         };
         let (events, actions) = (self.user_events(), self.actions());
-        let problem = Problem::new(&**system, t_span, &self.y0)
-            .options(options)
-            .events(&events)
-            .actions(&actions);
-        let span = t_span.1 - t_span.0;
+        let problem = self.problem(system, t_span, (options, &events, &actions));
         let (solution, derivatives) = run_with_derivatives(
             problem,
             (system, extension, &actions),
             options,
-            span,
+            t_span,
             wanted,
             interrupt,
         )?;
@@ -154,7 +150,20 @@ impl PreparedRun {
         run_with_growth(problem, of, options, marks, interrupt)
     }
 
-    fn user_events(&self) -> Vec<UserEvent<'_>> {
+    /// The run of this system, which is its own.
+    pub fn problem<'p>(
+        &'p self,
+        system: &'p filippov::TracedSystem,
+        t_span: (f64, f64),
+        (options, events, actions): (&'p Options, &'p [UserEvent<'p>], &'p Actions<'p>),
+    ) -> Problem<'p> {
+        Problem::new(system, t_span, &self.y0)
+            .options(options)
+            .events(events)
+            .actions(actions)
+    }
+
+    pub fn user_events(&self) -> Vec<UserEvent<'_>> {
         let events = self.events.iter();
         let events = events.map(|(function, direction, terminal)| UserEvent {
             function: &**function,
@@ -260,7 +269,12 @@ impl PreparedRun {
             self.given.retain(|(_, trigger, _)| is_at_surface(trigger));
             self.laws.retain(|law| is_at_surface(&law.trigger));
         }
-        self.events.clear();
+        if !derivatives
+            .as_ref()
+            .is_some_and(RunDerivatives::is_to_repeat)
+        {
+            self.events.clear();
+        }
         Run::new(self, solution, derivatives)
     }
 }

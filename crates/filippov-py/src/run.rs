@@ -42,6 +42,13 @@ type SegmentRow<'py> = (
     Vector<'py>,
 );
 
+type GradientRow<'py> = (
+    Vector<'py>,
+    Option<LostAt>,
+    BordersRow,
+    Vec<(usize, f64, Vector<'py>)>,
+);
+
 type DecisionRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>);
 
 type WarningRow<'py> = (
@@ -591,18 +598,26 @@ impl Run {
         self.derivatives.as_ref()?.trail_rows(py)
     }
 
-    /// The gradient of a cost, a sum of terms; and at which time and why there is none, if so.
+    /// The gradient of a cost, a sum of terms; at which time and why there is none, if so; and where terms at instants count.
     fn cost_gradient<'py>(
         &self,
         py: Python<'py>,
         terms: Vec<TermRow<'py>>,
-    ) -> PyResult<(Vector<'py>, Option<LostAt>, BordersRow)> {
+    ) -> PyResult<GradientRow<'py>> {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Err(PyValueError::new_err("the run has no derivatives"));
         };
         let run = (&*self.solution(), &self.prepared.actions());
-        let (entries, lost, borders) = derivatives.gradient(system, run, &terms)?;
-        Ok((PyArray1::from_vec(py, entries), lost, borders))
+        let of = (&self.prepared, &terms[..]);
+        let (entries, lost, borders, points) = derivatives.gradient(py, system, run, of)?;
+        let points = points.into_iter();
+        let points = points.map(|(term, t, x)| (term, t, PyArray1::from_vec(py, x)));
+        Ok((
+            PyArray1::from_vec(py, entries),
+            lost,
+            borders,
+            points.collect(),
+        ))
     }
 
     /// The same at the end of the run.

@@ -111,7 +111,7 @@ pub use inspect::{
     message_of, not_finite, state_text, Classification, HiddenDynamics, HiddenRoot, Inspection,
     IntersectionValue, Leg, LegError, NotFinitePlace, OffSurfaces, Over, PointKind,
 };
-pub use integrate::{Integrator, Problem, Reached};
+pub use integrate::{Integrator, Problem, Reached, ReplayError};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{

@@ -13,6 +13,7 @@ enum Pending {
 }
 
 /// The known times of all actions.
+#[derive(Clone)]
 pub(crate) struct Timetable {
     /// The action with what is left of its times.
     rows: Vec<(usize, Pending)>,

@@ -36,6 +36,7 @@ pub struct SharedLoad {
 }
 
 /// What the multipliers of surfaces follow from, for one N.
+#[derive(Clone)]
 pub struct SharedLoads {
     normal: SparseRows,
     /// Surfaces with multipliers of their own, and their equations.
@@ -195,6 +196,7 @@ pub fn stay_together(normal: &SparseRows, gradients: &SparseRows, loops: &[Vec<u
 }
 
 /// Contacts of one component with N of less than full rank.
+#[derive(Clone)]
 struct Loop {
     surfaces: Vec<usize>,
     /// Contacts that determine the others, in the order of elimination, with their rows in terms of Q.

@@ -12,7 +12,7 @@ use crate::switch::{Kind, Switch};
 use crate::tolerances::{SAME_MEAN, STEADY_ROUNDS};
 
 /// The rounds that the last switches make, one after the other.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Rounds {
     /// Switches of one round; none if the last switches make no rounds.
     turn: Option<usize>,

@@ -5,6 +5,8 @@
 //! steps are taken back by the transpose of the equations that carry changes forward, so that the product of w with a change is the
 //! same at all times, to rounding.
 
+use std::cell::RefCell;
+
 use super::between::{state_at, EventGradient};
 use super::borders::{
     differ, is_missed_later, surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders,
@@ -13,7 +15,7 @@ use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
 use super::instant::{arrival, Instant, Passage, Weights};
-use super::limit::{is_like, Shares};
+use super::limit::{is_like, Shares, MOST_REMEMBERED};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -22,15 +24,25 @@ use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, So
 use crate::system::{Actions, TracedSystem};
 use crate::vectors::dot;
 
-/// The instants of a run and the times of its steps, for the way back. An observer.
+/// The instants of a run, or of a stretch of it, and the times of its steps, for the way back. An observer.
 #[derive(Clone, Debug, Default)]
 pub struct Trail {
     start: Option<Start>,
     /// The ends of the steps, and how many instants were before.
     steps: Vec<(f64, usize)>,
     instants: Vec<KeptInstant>,
+    /// The first so many of them are from before the stretch: limits of infinitely many switches ask for them.
+    n_earlier: usize,
+    /// How many instants the run had before the first of them.
+    n_forgotten: usize,
+    /// The side of each surface on which the motion was last before the stretch, 0 if it was on none since the start of the run.
+    sides: Vec<i8>,
     /// So many discrete states are states here.
     n_named: usize,
+    /// How many bytes steps and instants take, without spare room.
+    n_bytes: usize,
+    /// Nothing is noted down any more.
+    is_closed: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -61,6 +73,60 @@ impl Trail {
         }
     }
 
+    /// How many bytes steps and instants take.
+    pub fn n_bytes(&self) -> usize {
+        self.n_bytes
+    }
+
+    /// How many bytes more the instants from before a stretch may take.
+    pub fn room_for_earlier(&self) -> usize {
+        let largest = self.instants.iter().map(KeptInstant::n_bytes).max();
+        largest.unwrap_or(0) * (MOST_REMEMBERED - self.n_earlier)
+    }
+
+    /// The time at its start; NaN if the run has not started.
+    pub fn t_start(&self) -> f64 {
+        self.start.as_ref().map_or(f64::NAN, |start| start.t)
+    }
+
+    /// Was the record of the run too large?
+    pub fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Forgets all and notes nothing down any more.
+    pub fn close(&mut self) {
+        *self = Trail {
+            n_named: self.n_named,
+            is_closed: true,
+            ..Trail::default()
+        };
+    }
+
+    /// The trail of the stretch that follows, which starts here.
+    pub fn next(&self, (t, x): (f64, &[f64]), mode: &Mode, q: &[f64]) -> Self {
+        let n_kept = self.instants.len().min(MOST_REMEMBERED);
+        let forgotten = self.instants.len() - n_kept;
+        let mut sides = self.sides.clone();
+        let own = self.instants[self.n_earlier..].iter();
+        let modes = own.map(|instant| instant.record().mode[0]);
+        for mode in self.start.iter().map(|start| &start.mode).chain(modes) {
+            sides.resize(mode.entries().len(), 0);
+            take_sides(&mut sides, mode.entries());
+        }
+        let mut next = Trail {
+            instants: self.instants[forgotten..].to_vec(),
+            n_earlier: n_kept,
+            n_forgotten: self.n_forgotten + forgotten,
+            sides,
+            n_named: self.n_named,
+            ..Trail::default()
+        };
+        next.n_bytes = next.instants.iter().map(KeptInstant::n_bytes).sum();
+        next.begin(t, x, mode, q);
+        next
+    }
+
     fn begin(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) {
         self.start.get_or_insert_with(|| Start {
             t,
@@ -73,18 +139,37 @@ impl Trail {
 
 impl Observer for Trail {
     fn step(&mut self, step: &ObservedStep) {
+        if self.is_closed {
+            return;
+        }
         if self.start.is_none() {
             let mut x = vec![0.0; step.x_end.len()];
             step.at(step.t_start(), &mut x);
             self.begin(step.t_start(), &x, step.mode, step.discrete);
         }
         self.steps.push((step.t_end, self.instants.len()));
+        self.n_bytes += size_of::<(f64, usize)>();
     }
 
     fn instant(&mut self, record: &InstantRecord) {
+        if self.is_closed {
+            return;
+        }
         self.begin(record.t[0], record.x[0], record.mode[0], record.discrete[0]);
         let kept = KeptInstant::with_discrete_as_states(record, self.n_named);
+        self.n_bytes += kept.n_bytes();
         self.instants.push(kept);
+    }
+}
+
+/// A trail that is read while the run goes on.
+impl Observer for &RefCell<Trail> {
+    fn step(&mut self, step: &ObservedStep) {
+        self.borrow_mut().step(step);
+    }
+
+    fn instant(&mut self, record: &InstantRecord) {
+        self.borrow_mut().instant(record);
     }
 }
 
@@ -119,6 +204,19 @@ pub struct CostGradient {
     pub lost: Option<(f64, &'static str)>,
     /// Where it is that of one side.
     pub borders: Borders,
+    /// Where terms at instants count, by the place of the term, the last instant of each first.
+    pub points: Vec<TermPoint>,
+}
+
+/// Where a term of a cost counts: the state is that before the instant.
+#[derive(Clone, Debug)]
+pub struct TermPoint {
+    /// The place of the term.
+    pub term: usize,
+    /// The time.
+    pub t: f64,
+    /// The state, the named discrete states behind it.
+    pub x: Vec<f64>,
 }
 
 impl CostGradient {
@@ -132,74 +230,122 @@ impl CostGradient {
     }
 }
 
-/// A run, with what its gradients need.
+/// What gradients of a run need, beside its record.
 pub struct WayBack<'r> {
-    /// The run, kept as a function.
-    pub solution: &'r Solution,
-    /// Its instants.
-    pub trail: &'r Trail,
     /// The system, and its extension by the parameters.
     pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// The impacts of the extended system.
+    pub impacts: &'r Actions<'r>,
     /// By what the gradient is asked for.
     pub kinds: &'r [Column],
     /// The options of the run.
     pub options: &'r Options,
-    /// The length of its span of time.
-    pub span: f64,
+    /// The span of time that was asked for.
+    pub t_span: (f64, f64),
+}
+
+/// The record of a run, or of a stretch of it: continuous extensions, and instants.
+pub struct Stretch<'s> {
+    /// The run, kept as a function.
+    pub solution: &'s Solution,
+    /// Its instants.
+    pub trail: &'s Trail,
+    /// The run starts with it.
+    pub is_first: bool,
 }
 
 /// The gradient on its way back.
-struct Walk<'w> {
+pub struct Walk<'w> {
     run: &'w WayBack<'w>,
+    terms: &'w [Term<'w>],
     /// By the state, with the shares of the parameters behind it.
     w: Vec<f64>,
-    terms: Vec<(f64, &'w Term<'w>)>,
+    /// Those at times, with their places, that are still to come.
+    timed: Vec<(f64, usize)>,
+    /// The motion that has been reached.
+    piece: Option<Piece<'w>>,
+    /// The last time of the run.
+    t_last: f64,
     /// What the limits of infinitely many switches owe to earlier instants.
     owed: Vec<Shares>,
     borders: Borders,
+    points: Vec<TermPoint>,
+    /// From where on there is no derivative.
+    lost: Option<(f64, &'static str)>,
 }
 
 impl WayBack<'_> {
-    /// The gradient of a sum of terms.
+    /// The gradient of a sum of terms, of a run that was kept as a whole.
     ///
     /// # Errors
     /// What a function of the user raised.
-    pub fn gradient<'t>(&'t self, terms: &'t [Term<'t>]) -> Result<CostGradient, FieldError> {
-        let extended = self.systems.1;
-        let (n, m) = (extended.n, extended.n_parameters());
-        let mut timed: Vec<(f64, &Term)> = Vec::new();
-        for term in terms {
+    pub fn gradient(
+        &self,
+        (solution, trail): (&Solution, &Trail),
+        terms: &[Term],
+    ) -> Result<CostGradient, FieldError> {
+        let mut walk = Walk::new(self, terms);
+        let whole = Stretch {
+            solution,
+            trail,
+            is_first: true,
+        };
+        walk.back(&whole)?;
+        walk.finish(trail)
+    }
+}
+
+impl<'w> Walk<'w> {
+    /// At the end of the run.
+    pub fn new(run: &'w WayBack<'w>, terms: &'w [Term<'w>]) -> Self {
+        let mut timed: Vec<(f64, usize)> = Vec::new();
+        for (place, term) in terms.iter().enumerate() {
             if let When::Time(t) | When::Zero(t, _) = term.at {
-                timed.push((t, term));
+                timed.push((t, place));
             }
         }
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut walk = Walk {
-            run: self,
-            w: vec![0.0; n + m],
-            terms: timed,
+        let extended = run.systems.1;
+        Walk {
+            run,
+            terms,
+            w: vec![0.0; extended.n + extended.n_parameters()],
+            timed,
+            piece: None,
+            t_last: f64::NAN,
             owed: Vec::new(),
             borders: Borders::default(),
-        };
-        let impacts = extended.impacts();
-        let lost = walk.back(terms, &impacts)?;
+            points: Vec::new(),
+            lost: None,
+        }
+    }
+
+    /// The gradient, at the start of the run, whose first stretch has this trail.
+    ///
+    /// # Errors
+    /// What a function of the user raised.
+    pub fn finish(mut self, trail: &Trail) -> Result<CostGradient, FieldError> {
+        let WayBack { impacts, .. } = *self.run;
+        let (extended, options, kinds) = (self.run.systems.1, self.run.options, self.run.kinds);
+        let n = extended.n;
         let mut found = CostGradient {
-            by_parameters: walk.w.split_off(n),
-            by_state: walk.w,
+            by_parameters: self.w.split_off(n),
+            by_state: self.w,
             by_start: f64::NAN,
-            lost,
-            borders: walk.borders,
+            lost: self.lost,
+            borders: self.borders,
+            points: self.points,
         };
         if found.lost.is_some() {
             found.by_state.fill(f64::NAN);
             found.by_parameters.fill(f64::NAN);
-        } else if let Some(start) = &self.trail.start {
-            let mut around = Surroundings::at_start(extended, &impacts, self.options);
+        } else if let Some(start) = &trail.start {
+            let mut around = Surroundings::at_start(extended, impacts, options);
             around.take_sides(&start.mode);
             let mut piece = Piece::new(&around, &start.mode, &start.q);
             let z = extended.state(&start.x);
             let field = piece.rates(start.t, &z)?;
-            let columns = extended.columns_at_start(self.kinds, &field);
+            let columns = extended.columns_at_start(kinds, &field);
             if let Some(arrival) = arrival(&piece, start.t, &z)? {
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 arrival.pull_back(n, &mut whole);
@@ -208,77 +354,102 @@ impl WayBack<'_> {
             }
             let borders = &mut found.borders;
             let at = (start.t, &z[..]);
-            borders.starts_on = surfaces_at_start(&mut piece, at, self.kinds, &columns)?;
-            borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, self.kinds)?;
+            borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?;
+            borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
             found.by_start = -dot(&found.by_state, &field);
         }
         Ok(found)
     }
-}
 
-impl<'w> Walk<'w> {
-    /// From the end to the start; where it was lost, if it was.
-    fn back(
-        &mut self,
-        terms: &[Term],
-        impacts: &Actions,
-    ) -> Result<Option<(f64, &'static str)>, FieldError> {
-        let trail = self.run.trail;
+    /// From the end of a stretch to its start. The first one is that in which the run ends, then each that comes before.
+    ///
+    /// # Errors
+    /// What a function of the user raised.
+    pub fn back(&mut self, stretch: &Stretch) -> Result<(), FieldError> {
+        let trail = stretch.trail;
         let Some(start) = &trail.start else {
-            return Ok(None);
+            return Ok(());
         };
-        let pieces = self.surroundings(impacts);
+        let pieces = self.surroundings(trail);
+        let around = |number: usize| &pieces[number - trail.n_earlier];
+        let mut piece = match self.piece.take() {
+            Some(piece) => piece,
+            None => self.at_end(stretch, start, around(trail.instants.len()))?,
+        };
         let mut steps = trail.steps.iter().rev().peekable();
-        let last = trail.instants.last().map(KeptInstant::record);
-        let (mode, q) = last.map_or((&start.mode, &start.q[..]), |record| {
-            (record.mode[1], record.discrete[1])
-        });
-        let mut piece = Piece::new(&pieces[trail.instants.len()], mode, q);
-        let x = self
-            .run
-            .systems
-            .1
-            .with_named(self.run.solution.last_state(), q);
-        let end = (self.run.solution.t_last, &x[..]);
-        for term in terms {
-            if let When::End(zero) = term.at {
-                self.add_term(&mut piece, (term.cost, zero), end)?;
-            }
-        }
-        for number in (0..=trail.instants.len()).rev() {
-            let earlier = number.checked_sub(1);
+        for number in (trail.n_earlier..=trail.instants.len()).rev() {
+            let earlier = number.checked_sub(1).filter(|&k| k >= trail.n_earlier);
             let record = earlier.map(|earlier| trail.instants[earlier].record());
             let first = record.map_or(start.t, |record| record.t[1]);
             while let Some(&(end, _)) = steps.next_if(|step| step.1 == number) {
                 let before = steps.peek().map_or(start.t, |step| step.0);
-                self.step(&mut piece, (before.max(first), end))?;
+                let span = (before.max(first), end);
+                self.step(stretch.solution, &mut piece, span)?;
             }
             let (Some(earlier), Some(record)) = (earlier, record) else {
-                self.terms_at(&mut piece, start.t)?;
+                if stretch.is_first {
+                    self.terms_at(stretch.solution, &mut piece, start.t)?;
+                }
                 break;
             };
-            let mut before = Piece::new(&pieces[earlier], record.mode[0], record.discrete[0]);
-            let both = (&mut before, &mut piece);
-            if let Some(lost) = self.pass(earlier, &record, &pieces[earlier], both, terms)? {
-                return Ok(Some((record.t[0], lost)));
+            let mut before = Piece::new(around(earlier), record.mode[0], record.discrete[0]);
+            self.note_points(&record);
+            if self.lost.is_none() {
+                let both = (&mut before, &mut piece);
+                let lost = self.pass((trail, earlier), &record, around(earlier), both)?;
+                self.lost = lost.map(|lost| (record.t[0], lost));
             }
             piece = before;
         }
-        Ok(None)
+        self.piece = Some(piece);
+        Ok(())
+    }
+
+    /// The motion at the end of the run, with the terms there.
+    fn at_end(
+        &mut self,
+        stretch: &Stretch,
+        start: &Start,
+        around: &Surroundings<'w>,
+    ) -> Result<Piece<'w>, FieldError> {
+        let last = stretch.trail.instants.last().map(KeptInstant::record);
+        let (mode, q) = last.map_or((&start.mode, &start.q[..]), |record| {
+            (record.mode[1], record.discrete[1])
+        });
+        let mut piece = Piece::new(around, mode, q);
+        let extended = self.run.systems.1;
+        let x = extended.with_named(stretch.solution.last_state(), q);
+        self.t_last = stretch.solution.t_last;
+        let end = (self.t_last, &x[..]);
+        for term in self.terms {
+            if let When::End(zero) = term.at {
+                self.add_term(&mut piece, (term.cost, zero), end)?;
+            }
+        }
+        Ok(piece)
+    }
+
+    /// Notes down where terms of a surface count, if this instant is brought about by one.
+    fn note_points(&mut self, record: &InstantRecord) {
+        for (term, t, x) in self
+            .at_surface(record)
+            .map(|term| (term, record.t[0], record.x[0]))
+        {
+            let x = x.to_vec();
+            self.points.push(TermPoint { term, t, x });
+        }
     }
 
     /// The surroundings of the pieces, in order.
-    fn surroundings<'s>(&self, impacts: &'s Actions<'s>) -> Vec<Surroundings<'s>>
-    where
-        'w: 's,
-    {
+    fn surroundings(&self, trail: &Trail) -> Vec<Surroundings<'w>> {
         let run = self.run;
-        let mut around = Surroundings::at_start(run.systems.1, impacts, run.options);
-        if let Some(start) = &run.trail.start {
+        let mut around = Surroundings::at_start(run.systems.1, run.impacts, run.options);
+        take_sides(&mut around.sides, &trail.sides);
+        if let Some(start) = &trail.start {
             around.take_sides(&start.mode);
         }
         let mut all = vec![around.clone()];
-        for instant in &run.trail.instants {
+        for instant in &trail.instants[trail.n_earlier..] {
             let record = instant.record();
             around.take_sides(record.mode[0]);
             all.push(around.clone());
@@ -287,27 +458,35 @@ impl<'w> Walk<'w> {
     }
 
     /// Takes the gradient back over a step, and adds the terms in it.
-    fn step(&mut self, piece: &mut Piece, (begin, end): (f64, f64)) -> Result<(), FieldError> {
+    fn step(
+        &mut self,
+        solution: &Solution,
+        piece: &mut Piece,
+        (begin, end): (f64, f64),
+    ) -> Result<(), FieldError> {
         let mut at = end;
         loop {
-            self.terms_at(piece, at)?;
-            let next = self.terms.last().map_or(begin, |term| term.0.max(begin));
+            self.terms_at(solution, piece, at)?;
+            let next = self.timed.last().map_or(begin, |term| term.0.max(begin));
             if at <= begin {
                 return Ok(());
             }
             let run = self.run;
             let path = |t: f64, x: &mut [f64]| {
-                // The continuous extension of this step, also at its end.
+                // The continuous extension of this step, also at its end, which rounding may go beyond.
+                let t = t.min(end);
                 let side = if t >= end { Side::Left } else { Side::Right };
-                state_at(run.solution, run.systems, (t, side), x)
+                state_at(solution, run.systems, (t, side), x)
             };
-            let mut x = vec![0.0; run.systems.1.n];
-            path(at, &mut x)?;
-            let z = run.systems.1.state(&x);
-            if let Some(projection) = piece.projection(&[], at, &z)? {
-                projection.pull_back(run.systems.1.n, &mut self.w);
+            if self.lost.is_none() {
+                let mut x = vec![0.0; run.systems.1.n];
+                path(at, &mut x)?;
+                let z = run.systems.1.state(&x);
+                if let Some(projection) = piece.projection(&[], at, &z)? {
+                    projection.pull_back(run.systems.1.n, &mut self.w);
+                }
+                piece.pull_back(path, (next, at), &mut self.w)?;
             }
-            piece.pull_back(path, (next, at), &mut self.w)?;
             at = next;
             if at <= begin {
                 return Ok(());
@@ -316,16 +495,24 @@ impl<'w> Walk<'w> {
     }
 
     /// Adds the terms at a time and later, of the motion before.
-    fn terms_at(&mut self, piece: &mut Piece, t: f64) -> Result<(), FieldError> {
-        while let Some((at, term)) = self.terms.pop_if(|term| term.0 >= t) {
-            let run = self.run;
+    fn terms_at(
+        &mut self,
+        solution: &Solution,
+        piece: &mut Piece,
+        t: f64,
+    ) -> Result<(), FieldError> {
+        while let Some((t, place)) = self.timed.pop_if(|term| term.0 >= t) {
+            let (run, term) = (self.run, &self.terms[place]);
             let mut x = vec![0.0; run.systems.1.n];
-            state_at(run.solution, run.systems, (at, Side::Left), &mut x)?;
+            state_at(solution, run.systems, (t, Side::Left), &mut x)?;
             let zero = match term.at {
                 When::Zero(_, function) => Some(function),
                 _ => None,
             };
-            self.add_term(piece, (term.cost, zero), (at, &x))?;
+            if self.lost.is_none() {
+                self.add_term(piece, (term.cost, zero), (t, &x))?;
+            }
+            self.points.push(TermPoint { term: place, t, x });
         }
         Ok(())
     }
@@ -354,17 +541,16 @@ impl<'w> Walk<'w> {
     /// Takes the gradient back through an instant.
     fn pass<'p>(
         &mut self,
-        number: usize,
+        (trail, place): (&Trail, usize),
         record: &InstantRecord,
         around: &Surroundings<'p>,
         (before, after): (&mut Piece<'p>, &mut Piece<'p>),
-        terms: &[Term],
     ) -> Result<Option<&'static str>, FieldError> {
         let extended = before.extended;
         let n = extended.n;
         let options = self.run.options;
         let weights = Weights {
-            span: self.run.span,
+            span: self.run.t_span.1 - self.run.t_span.0,
             rtol: options.rtol,
             atol: options.atol.clone(),
         };
@@ -398,14 +584,14 @@ impl<'w> Walk<'w> {
             if let Some(projection) = instant.after.projection(&[], record.t[1], &z)? {
                 projection.pull_back(n, &mut self.w);
             }
-            let Some(shares) = self.shares(number, record) else {
+            let Some(shares) = self.shares(trail, place, record) else {
                 return Ok(Some("accumulation"));
             };
             self.w[..n].fill(0.0);
             self.owed.extend(shares);
         }
         for owed in std::mem::take(&mut self.owed) {
-            if owed.instant != number {
+            if owed.instant != trail.n_forgotten + place {
                 self.owed.push(owed);
                 continue;
             }
@@ -413,18 +599,25 @@ impl<'w> Walk<'w> {
             let moved = dot(&owed.by_state, record.field[0]) + owed.by_time;
             add(&mut self.w, moved, &time);
         }
-        for term in terms {
-            let surface = record.guards.first().and_then(|guard| guard.surface());
-            if matches!(term.at, When::Surface(j) if surface == Some(j)) {
-                let z = extended.state(record.x[0]);
-                let (by_time, gradient) = term.cost.at(record.t[0], &z, record.discrete[0])?;
-                add(&mut self.w, 1.0, &gradient);
-                let moved = by_time + dot(&gradient[..n], record.field[0]);
-                add(&mut self.w, moved, &time);
-            }
+        for place in self.at_surface(record) {
+            let z = extended.state(record.x[0]);
+            let cost = self.terms[place].cost;
+            let (by_time, gradient) = cost.at(record.t[0], &z, record.discrete[0])?;
+            add(&mut self.w, 1.0, &gradient);
+            let moved = by_time + dot(&gradient[..n], record.field[0]);
+            add(&mut self.w, moved, &time);
         }
         let is_finite = self.w.iter().all(|value| value.is_finite());
         Ok((!is_finite).then_some("not_finite"))
+    }
+
+    /// The places of the terms that count at an instant since a surface brings it about.
+    fn at_surface(&self, record: &InstantRecord) -> impl Iterator<Item = usize> + 'w {
+        let surface = record.guards.first().and_then(|guard| guard.surface());
+        let terms = self.terms.iter().enumerate();
+        let at = terms
+            .filter(move |(_, term)| matches!(term.at, When::Surface(j) if surface == Some(j)));
+        at.map(|(place, _)| place)
     }
 
     /// Notes on which surfaces actions put the state, for changes of the state before them and of what is asked for.
@@ -448,7 +641,7 @@ impl<'w> Walk<'w> {
         for passage in passages {
             arrives |= passage.apply(extended.n, &mut columns);
         }
-        self.borders.ends_at_instant |= arrives && record.t[1] == self.run.solution.t_last;
+        self.borders.ends_at_instant |= arrives && record.t[1] == self.t_last;
         let landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;
         if !landed.is_empty() {
             self.borders.lands_on = Some((record.t[1], landed));
@@ -466,28 +659,36 @@ impl<'w> Walk<'w> {
             }
             is_timed |= passage.time.iter().any(|entry| *entry != 0.0);
         }
-        if is_timed && record.t[1] == self.run.solution.t_last {
+        if is_timed && record.t[1] == self.t_last {
             self.borders.ends_at_instant |= differ(&after, &self.w);
         }
-        let start = self
-            .run
-            .trail
-            .start
-            .as_ref()
-            .map_or(record.t[0], |start| start.t);
+        let start = self.run.t_span.0;
         self.borders.starts_at_action |=
             is_missed_later(self.run.systems.1, record, start, self.run.kinds);
         let guarded = passages.last();
         guarded.map_or_else(Row::new, |passage| passage.time.clone())
     }
 
-    /// What the limit of infinitely many switches takes from the instants before.
-    fn shares(&self, number: usize, record: &InstantRecord) -> Option<[Shares; 3]> {
-        let instants = &self.run.trail.instants[..=number];
+    /// What the limit of infinitely many switches takes from the instants before, of which as many count as on the way forward.
+    fn shares(&self, trail: &Trail, place: usize, record: &InstantRecord) -> Option<[Shares; 3]> {
+        let instants = &trail.instants[..=place];
         let like = |k: usize| is_like(&instants[k].record(), record);
-        let round = (1..=number / 2).find(|r| like(number - r) && like(number - 2 * r))?;
-        let of = |k: usize| instants[k].record();
-        let all = [number, number - round, number - 2 * round];
-        Shares::of(all, all.map(of), &self.w[..record.x[1].len()])
+        let mut rounds = 1..=place.min(MOST_REMEMBERED - 1) / 2;
+        let round = rounds.find(|r| like(place - r) && like(place - 2 * r))?;
+        let all = [place, place - round, place - 2 * round];
+        let numbers = all.map(|k| trail.n_forgotten + k);
+        Shares::of(
+            numbers,
+            all.map(|k| instants[k].record()),
+            &self.w[..record.x[1].len()],
+        )
     }
+}
+
+/// Takes those that are not 0.
+fn take_sides(sides: &mut [i8], entries: &[i8]) {
+    let pairs = sides.iter_mut().zip(entries);
+    pairs
+        .filter(|(_, entry)| **entry != 0)
+        .for_each(|(side, entry)| *side = *entry);
 }

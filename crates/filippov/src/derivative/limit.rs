@@ -13,7 +13,7 @@ use crate::record::InstantRecord;
 use crate::vectors::dot;
 
 /// Instants that are remembered: two rounds of up to so many and the last one.
-const MOST_REMEMBERED: usize = 17;
+pub(super) const MOST_REMEMBERED: usize = 17;
 
 /// An instant, seen from the motion before it.
 struct Past {

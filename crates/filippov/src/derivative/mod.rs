@@ -29,7 +29,7 @@ mod second;
 mod series;
 mod tangents;
 
-pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
+pub use adjoint::{CostGradient, Stretch, Term, TermPoint, Trail, Walk, WayBack, When};
 pub use between::{Differentiated, DifferentiatedRun, EventGradient};
 pub use borders::Borders;
 pub use exponents::{Exponents, Growth};

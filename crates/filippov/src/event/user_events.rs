@@ -62,6 +62,8 @@ pub(crate) struct UserEvents<'a> {
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
     pub zeros: Vec<Vec<UserZero>>,
+    /// How many zeros each has had, also those that are not kept.
+    pub n_zeros: Vec<u64>,
     /// No step has been taken yet: a zero at the very start counts, as in SciPy.
     pub at_start: bool,
     /// The only function is that of the section: its zeros are returns.
@@ -85,6 +87,7 @@ impl<'a> UserEvents<'a> {
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
+            n_zeros: vec![0; d],
             at_start: true,
             is_section: false,
         }
@@ -111,6 +114,21 @@ impl<'a> UserEvents<'a> {
     /// Forgets the signs before a jump of the state, so that the next step does not compare its own with them.
     pub fn forget_sides(&mut self) {
         self.sides.fill(0.0);
+    }
+
+    /// The same without the zeros so far.
+    pub fn without_zeros(&self) -> Self {
+        UserEvents {
+            left: self.left.clone(),
+            before: self.before.clone(),
+            sides: self.sides.clone(),
+            at_end: self.at_end.clone(),
+            q: self.q.clone(),
+            last: self.last.clone(),
+            zeros: vec![Vec::new(); self.zeros.len()],
+            n_zeros: self.n_zeros.clone(),
+            ..*self
+        }
     }
 
     pub fn into_zeros(self) -> Vec<Vec<UserZero>> {

@@ -17,7 +17,7 @@ pub struct Reached {
 }
 
 /// The switches since time last went on, and since the state last did.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Progress {
     /// The time of the first of them.
     since: Option<f64>,

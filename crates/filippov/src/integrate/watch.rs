@@ -64,6 +64,12 @@ impl<'a> Watch<'a> {
         self.looked = Some(now);
     }
 
+    /// The run is at another of its places, maybe at its start; it is looked at again at once.
+    pub fn begin_anew(&mut self, is_started: bool) {
+        self.started.set(is_started.then(|| self.now()));
+        (self.looked, self.interval, self.next) = (self.started.get(), 1, 0);
+    }
+
     /// Has the run started?
     pub fn is_started(&self) -> bool {
         self.started.get().is_some()

@@ -11,6 +11,7 @@ use crate::tolerances::{MOST_MEETING, ROUNDING};
 const MOST_SWEEPS: usize = 50;
 
 /// Multipliers by one sparse linear system, however many surfaces there are.
+#[derive(Clone)]
 pub struct AffineLaw<'a> {
     system: &'a dyn AffineSigns,
     parts: AffineParts,

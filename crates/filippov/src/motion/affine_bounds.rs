@@ -21,6 +21,7 @@ use crate::system::{AffineSigns, Setting};
 ///
 /// Reference: A. Ostrowski, Über die Determinanten mit überwiegender Hauptdiagonale, *Comment. Math. Helv.* 10
 /// (1937); A. Neumaier, *Interval Methods for Systems of Equations* (1990), section 3.7.
+#[derive(Clone)]
 pub struct AffineBounds {
     normal: RefCell<SparseSolver>,
     comparison: RefCell<SparseSolver>,

@@ -18,6 +18,7 @@ use crate::system::{OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::EPS;
 
 /// The motion of a mode, whatever its kind.
+#[derive(Clone)]
 pub(crate) enum ModeField<'a> {
     Region(RegionField<'a>),
     Sliding(Box<SlidingField<'a>>),
@@ -206,6 +207,7 @@ impl SmoothField for ModeField<'_> {
 /// Sliding of higher order: h = 0 and, where both fields cross the surface at the same rate, this rate = 0. It is sliding on the
 /// rates in the reduced system ([`PiecewiseSystem::reduced`]). The multiplier is the equivalent control, which keeps the
 /// highest of these derivatives at zero; its ends are the guards.
+#[derive(Clone)]
 pub(crate) struct ReducedField<'a> {
     system: &'a dyn PiecewiseSystem,
     surfaces: SlidingSet,

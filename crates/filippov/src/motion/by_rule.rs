@@ -16,6 +16,7 @@ use crate::system::{PiecewiseSystem, Place};
 /// Its exit functions differ from those of the canopy. Two per surface, for the sides -1 and +1, measure how clearly the
 /// motions on that side approach the intersection. The next one measures the premise of the rule. The last one, for two
 /// surfaces, is 1 - gamma, which is negative if the fields wind outwards. A function without such a condition is 1.
+#[derive(Clone)]
 pub struct RuleLaw {
     rule: SlidingRule,
     fields: MeetingFields,

@@ -12,6 +12,7 @@ use crate::system::{PiecewiseSystem, Place};
 use crate::tolerances::TRACKED_CHANGE;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
+#[derive(Clone)]
 pub struct Canopy {
     fields: MeetingFields,
     weights: Vec<f64>,

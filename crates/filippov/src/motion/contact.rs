@@ -21,6 +21,7 @@ use crate::tolerances::{DOUBTFUL, ROUNDING, VANISHING_GERM};
 ///
 /// Contact c lasts while nu_c > 0 (it pushes and does not pull), sliding while lambda_k = 2 mu_k - 1 lies in [-r, r],
 /// r the ratio of static to kinetic friction, 1 for a Filippov system.
+#[derive(Clone)]
 pub struct ContactField<'a> {
     system: &'a dyn PiecewiseSystem,
     actions: &'a Actions<'a>,

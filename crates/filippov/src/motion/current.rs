@@ -18,6 +18,7 @@ use crate::system::{MotionJets, PiecewiseSystem, Setting};
 const MOST_KNOWN: usize = 8;
 
 /// What follows from a mode alone, wherever its motion starts.
+#[derive(Clone)]
 struct KnownMode {
     mode: Mode,
     active: SmallVec<[bool; 8]>,
@@ -28,6 +29,7 @@ struct KnownMode {
 }
 
 /// One piece of constant mode.
+#[derive(Clone)]
 pub(crate) struct CurrentMotion<'a> {
     pub mode: Mode,
     pub t_start: f64,

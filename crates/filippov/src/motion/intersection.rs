@@ -26,6 +26,7 @@ use crate::tolerances::{AT_SIDE, HELD_AFTER, MOST_MEETING, MOST_TRACKED};
 /// for more they are tracked by Newton's method.
 ///
 /// Reference: Guglielmi, Hairer (2022), sections 2, 4 and 7; `docs/theory/intersections.md`.
+#[derive(Clone)]
 pub struct IntersectionField<'a> {
     system: &'a dyn PiecewiseSystem,
     set: Vec<usize>,

@@ -5,6 +5,7 @@ use crate::error::FieldError;
 use crate::system::{move_inside, side_offsets, OwnSetting, PiecewiseSystem, Setting};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
+#[derive(Clone)]
 pub struct RegionField<'a> {
     system: &'a dyn PiecewiseSystem,
     setting: OwnSetting,

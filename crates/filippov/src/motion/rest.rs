@@ -6,6 +6,7 @@ use super::{Motion, SmoothField};
 use crate::error::FieldError;
 
 /// The state stays as it is. Nothing ends it but an action: the system does not depend on time.
+#[derive(Clone)]
 pub struct RestField {
     n_surfaces: usize,
 }

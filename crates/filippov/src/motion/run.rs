@@ -11,6 +11,7 @@ use crate::tolerances::SMALL_JUMP;
 /// A run: its problem, the place that it has reached, the motion from there, and what was counted.
 ///
 /// Steps, searches, decisions and actions are handed a run.
+#[derive(Clone)]
 pub(crate) struct Run<'a> {
     pub system: &'a dyn PiecewiseSystem,
     pub options: &'a Options,

@@ -4,7 +4,7 @@ use super::{Guard, IntersectionField};
 use crate::tolerances::{AT_SIDE, TANGENT};
 
 /// What the guards of the present mode may fall below zero by.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Slacks(Vec<(Guard, f64)>);
 
 impl Slacks {

@@ -43,6 +43,7 @@ impl NormalComponents {
 /// evaluated at the projection of the point onto the surface.
 ///
 /// Reference: Filippov (1988); Guglielmi, Hairer (2022), section 4.1.
+#[derive(Clone)]
 pub struct SlidingField<'a> {
     system: &'a dyn PiecewiseSystem,
     surface: usize,
@@ -60,6 +61,7 @@ pub struct SlidingField<'a> {
 
 /// Sliding starts at a two-fold: from its start until this time the multiplier is its power series, not the quotient of
 /// two numbers that vanish.
+#[derive(Clone)]
 struct StartAtTwoFold {
     start: f64,
     until: f64,

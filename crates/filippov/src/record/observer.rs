@@ -137,6 +137,22 @@ impl KeptInstant {
         kept
     }
 
+    /// How many bytes it takes, spare room not counted.
+    pub fn n_bytes(&self) -> usize {
+        let rows = [&self.x, &self.discrete, &self.field];
+        let entries: usize = rows.into_iter().flatten().map(Vec::len).sum();
+        let map = self.map.as_ref().map_or(0, Vec::len);
+        let acts = self.acts.iter().map(|act| act.x.len() + act.discrete.len());
+        let numbers = entries + self.gradient.state.len() + map + acts.sum::<usize>();
+        // Each vector has a head of the allocator.
+        let n_vectors = 8 + 2 * self.acts.len();
+        let (numbers, heads) = (
+            numbers * size_of::<f64>(),
+            n_vectors * 2 * size_of::<usize>(),
+        );
+        size_of::<Self>() + self.acts.len() * size_of::<Act>() + numbers + heads
+    }
+
     /// The record.
     pub fn record(&self) -> InstantRecord<'_> {
         InstantRecord {
@@ -251,6 +267,11 @@ impl<'a> Observed<'a> {
     /// The motion that follows is the same as that of the system up to the tolerance only.
     pub fn replace(&mut self) {
         self.replaces = true;
+    }
+
+    /// Is it between the end of a motion and the start of the next one?
+    pub fn is_in_instant(&self) -> bool {
+        self.has_ended
     }
 
     /// Nothing has happened: the motion goes on.

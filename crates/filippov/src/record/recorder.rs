@@ -25,6 +25,11 @@ const USUAL_LENGTH: usize = 64;
 /// Of so many last switches a message names the surfaces.
 const SWITCHES_NAMED: usize = 32;
 
+/// About so many bytes are a switch of n states.
+fn bytes_of_switch(n: usize) -> usize {
+    size_of::<Switch>() + 2 * n * size_of::<f64>()
+}
+
 /// Keeps what a run produces, as far as it is wanted.
 ///
 /// The last switches are kept in any case: they tell whether switches accumulate.
@@ -83,6 +88,75 @@ impl<'a> Recorder<'a> {
             observed: None,
             decisions: Vec::new(),
         }
+    }
+
+    /// A recorder for a run that goes on from here, without what was recorded up to here but for the latest switches.
+    pub fn without_record(&self, t: f64, x: &[f64]) -> Self {
+        let latest = self.switches.latest();
+        let mut switches = Switches::default();
+        for switch in &latest[latest.len().saturating_sub(LATEST_SWITCHES)..] {
+            switches.push(switch.clone());
+        }
+        let mut recorder = Recorder {
+            n: self.n,
+            keep: self.keep,
+            t: Vec::new(),
+            y: Vec::new(),
+            y0: vec![0.0; self.n],
+            keep_dense: self.keep_dense,
+            steps: Vec::new(),
+            coefficients: Vec::new(),
+            segments: Segments::default(),
+            switches,
+            n_repeated: self.n_repeated,
+            jump: self.jump.clone(),
+            wanted: self.wanted.clone(),
+            next: self.next,
+            is_sampled: self.is_sampled,
+            user_events: self.user_events.without_zeros(),
+            visits: None,
+            observed: None,
+            decisions: Vec::new(),
+        };
+        recorder.start(t, x);
+        if let Some(last) = self.segments.latest().last() {
+            recorder.segments.push(Segment {
+                t_start: t,
+                t_end: t,
+                steps: (0, 0),
+                ..last.clone()
+            });
+        }
+        recorder
+    }
+
+    /// Forgets the steps and all but the last segment and the latest switches, and keeps no more from here on.
+    pub fn keep_last_only(&mut self) {
+        (self.keep, self.keep_dense) = (Keep::Last, false);
+        (self.t, self.y) = (Vec::new(), Vec::new());
+        (self.steps, self.coefficients) = (Vec::new(), Vec::new());
+        self.segments.forget_before(1);
+        if let Some(last) = self.segments.latest_mut().last_mut() {
+            last.steps = (0, 0);
+        }
+        self.switches.forget_before(LATEST_SWITCHES);
+    }
+
+    /// How many bytes steps, segments and switches take, spare room not counted.
+    pub fn n_bytes(&self) -> usize {
+        let numbers = self.t.len() + self.y.len() + self.coefficients.len();
+        let rows = self.segments.len() * size_of::<Segment>();
+        let switches = self.switches.len() * bytes_of_switch(self.n);
+        numbers * size_of::<f64>() + self.steps.len() * size_of::<Step>() + rows + switches
+    }
+
+    /// How many bytes more the latest switches may take, if there are any.
+    pub fn room_for_switches(&self) -> usize {
+        let missing = match self.switches.is_empty() {
+            true => 0,
+            false => LATEST_SWITCHES.saturating_sub(self.switches.len()),
+        };
+        missing * bytes_of_switch(self.n)
     }
 
     /// Are the continuous extensions kept?
@@ -325,8 +399,9 @@ impl<'a> Recorder<'a> {
             return visits.stop();
         }
         events.zeros[index].push(UserZero { t, y: y.to_vec() });
+        events.n_zeros[index] += 1;
         let terminal = events.events[index].terminal;
-        let is_last = terminal > 0 && events.zeros[index].len() as u64 >= terminal;
+        let is_last = terminal > 0 && events.n_zeros[index] >= terminal;
         is_last.then_some(Stop::TerminalEvent(index))
     }
 

@@ -4,6 +4,7 @@ use crate::status::Stop;
 use crate::tolerances::{CHATTER_STEPS, JUMP_SHRINK};
 
 /// Short steps since a jump of the field that no surface declares.
+#[derive(Clone)]
 struct Chatter {
     /// The step before the jump.
     pace: f64,
@@ -13,7 +14,7 @@ struct Chatter {
 }
 
 /// Looks for chatter.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct ChatterWatch(Option<Chatter>);
 
 impl ChatterWatch {

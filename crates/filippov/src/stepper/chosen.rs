@@ -11,6 +11,7 @@ use crate::status::Warning;
 macro_rules! methods {
     (|$start:ident, $span:ident| $($name:ident: $asked:pat $(if $may:expr)? => $built:expr,)*) => {
         /// The method that is asked before DOPRI5.
+        #[derive(Clone)]
         pub(super) enum Chosen {
             $($name(Box<$name>)),*
         }
@@ -23,6 +24,15 @@ macro_rules! methods {
                     $($asked $(if $may)? => Some(Chosen::$name(Box::new($built))),)*
                     Method::Auto | Method::Taylor | Method::Dopri5 => None,
                 }
+            }
+
+            /// About how many numbers its coefficients and matrices are.
+            pub fn n_numbers(&self) -> usize {
+                let matrices = match self {
+                    Chosen::Rodas5p(method) => method.n_in_matrices(),
+                    _ => 0,
+                };
+                2 * self.step().interpolant.coefficients().len() + matrices
             }
 
             /// Which one it is.

@@ -13,6 +13,7 @@ use crate::status::{Stop, Warning, WarningCode};
 use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, SMALLEST_GUESS};
 
 /// The control of the step: the proposed length, and what was seen of the steps before.
+#[derive(Clone)]
 pub(crate) struct StepControl {
     /// Proposed step; NaN if the next motion is to take a guess of its own.
     dt: f64,

@@ -23,6 +23,7 @@ const AS_OF_ORDER_FIVE: f64 = 5.0 / 8.0;
 ///
 /// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), sections II.5 and II.10.
 #[repr(C)]
+#[derive(Clone)]
 pub struct Dop853 {
     step: Step,
     /// Derivatives at the stages, at the end of the step, and at the stages of the extension.

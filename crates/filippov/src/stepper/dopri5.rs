@@ -23,6 +23,7 @@ const fn unrolled(n_states: usize) -> usize {
 /// next step.
 ///
 /// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), table II.5.2.
+#[derive(Clone)]
 pub struct Dopri5 {
     /// Its derivatives are those at the first and at the last stage.
     step: Step,

@@ -20,6 +20,7 @@ const AS_OF_ORDER_FIVE: f64 = 5.0 / 2.0;
 ///
 /// Reference: Dieci, Lopez, *SIAM J. Numer. Anal.* 47 (2009), section 5.
 #[repr(C)]
+#[derive(Clone)]
 pub struct Midpoint {
     step: Step,
     /// The derivative at the start is that of the field there, and not that of the step before at its end.

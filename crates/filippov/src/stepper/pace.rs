@@ -37,7 +37,7 @@ impl Pace {
 }
 
 /// How the last motions went, by mode.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Paces(FxHashMap<Mode, Pace>);
 
 impl Paces {

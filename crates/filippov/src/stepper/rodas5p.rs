@@ -20,6 +20,7 @@ use crate::tolerances::EPS;
 ///
 /// Reference: Steinebach, *BIT* 63:27 (2023); Hairer, Wanner, Solving ODEs II (1996), section IV.7.
 #[repr(C)]
+#[derive(Clone)]
 pub struct Rodas5p {
     step: Step,
     /// The derivatives of the motion by its expression graph; differences of its field if there are none.
@@ -48,6 +49,11 @@ impl Rodas5p {
             step: Step::new(n, Interpolant::powers(n, 4)),
             defect: zeros(),
         }
+    }
+
+    /// About how many numbers its matrices are: the Jacobian, and the factors with their pattern.
+    pub fn n_in_matrices(&self) -> usize {
+        6 * self.linearisation.rows().n_entries()
     }
 
     /// Takes space for the derivatives of the field of a motion that starts.

@@ -3,6 +3,7 @@
 use super::Interpolant;
 
 /// A step that was attempted, or is about to be.
+#[derive(Clone)]
 pub struct Step {
     /// The derivative at the start.
     pub start_derivative: Vec<f64>,

@@ -26,6 +26,7 @@ macro_rules! of_method_in_use {
 }
 
 /// The methods of a run. DOPRI5 is always there: it takes over if another method cannot go on.
+#[derive(Clone)]
 pub(crate) struct Steppers {
     dopri5: Dopri5,
     /// The other one, if the run has one.
@@ -45,6 +46,13 @@ impl Steppers {
             takes_motion: false,
             takes_step: false,
         }
+    }
+
+    /// About how many bytes the coefficients and matrices of the methods take.
+    pub fn n_bytes(&self) -> usize {
+        let own = self.dopri5.step().interpolant.coefficients().len();
+        let numbers = own + self.chosen.as_ref().map_or(0, Chosen::n_numbers);
+        numbers * size_of::<f64>()
     }
 
     /// The step of the method in use.

@@ -16,7 +16,7 @@ use crate::tolerances::{
 };
 
 /// The series of the present motion.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct MotionSeries {
     pub(super) jets: Option<Arc<MotionJets>>,
     /// How long a step the series allows that was taken at the start of the motion, until the step.
@@ -36,6 +36,7 @@ pub(super) struct MotionSeries {
 /// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
 /// Taylor methods*, Exp. Math. 14 (2005).
 #[repr(C)]
+#[derive(Clone)]
 pub struct Taylor {
     pub(super) step: Step,
     n: usize,

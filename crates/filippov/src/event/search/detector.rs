@@ -15,6 +15,7 @@ pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 const FEW_OF_ALL: usize = 4;
 
 /// Scratch space of the event stage, and values of what is monitored.
+#[derive(Clone)]
 pub(crate) struct Detector {
     /// Exit functions computed in the search of this step, by theta.
     pub exits: Vec<(f64, Exits)>,
