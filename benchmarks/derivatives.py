@@ -1,4 +1,4 @@
-"""What derivatives cost: a column of the dry-friction transient, and a gradient by a hundred parameters.
+"""What derivatives cost: columns of a transient, a gradient by a hundred parameters, one by pieces.
 
 Run ``python benchmarks/derivatives.py``; the table also goes into ``README.md`` unless ``--no-write``. Costs
 are instructions of a warmed call, counted by callgrind, Python included; without valgrind they are times.
@@ -22,7 +22,7 @@ from friction_chain import start_of_chain
 from measure import Line, interleaved, report, write_section
 
 N_MASSES = 10
-COLUMN, RUNS = 300e3, 5.0
+COLUMN, RUNS, MORE_RUNS = 300e3, 5.0, 2.0
 CHAIN_RUN = 19.6e6
 COUNTED = 10
 
@@ -136,11 +136,27 @@ def chain_of_parameters() -> dict[str, Callable[[], Any]]:
     }
 
 
+def long_transient() -> dict[str, Callable[[], Any]]:
+    """Return a long run of the oscillator, its gradient, and that within less memory than its record needs."""
+    system, span, start = oscillator(), (0.0, 4000.0), [1.0, 2.0]
+    options: dict[str, Any] = {"method": "Taylor", "rtol": 1e-9, "atol": 1e-9}
+
+    def gradient(memory: int) -> Any:
+        return fl.gradient(system, span, start, terminal=lambda t, y: y[0] ** 2, memory=memory, **options)
+
+    return {
+        "run": lambda: system.solve(span, start, **options),
+        "whole": lambda: gradient(2**40),
+        "pieces": lambda: gradient(2**20),
+    }
+
+
 CALLS: Mapping[str, Callable[[], dict[str, Callable[[], Any]]]] = {
     "transient": transient,
     "chain": chain_of_parameters,
+    "memory": long_transient,
 }
-WARM = {"transient": 1000, "chain": 300}
+WARM = {"transient": 1000, "chain": 300, "memory": 20}
 
 
 def costs(name: str) -> tuple[dict[str, float], str]:
@@ -185,6 +201,16 @@ def main() -> None:
             found["gradient"] / run,
             RUNS,
             detail=f"{found['gradient']:.3g} {unit}; a run {found['run']:.3g}",
+        )
+    )
+    found, unit = costs("memory")
+    run = found["run"]
+    lines.append(
+        Line(
+            "long transient, gradient by pieces: runs more than by a record",
+            (found["pieces"] - found["whole"]) / run,
+            MORE_RUNS,
+            detail=f"{found['pieces'] / found['whole']:.2f} of that gradient; a run {run:.3g} {unit}",
         )
     )
     lines += beside_cvodes()
