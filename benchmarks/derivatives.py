@@ -137,7 +137,7 @@ def chain_of_parameters() -> dict[str, Callable[[], Any]]:
 
 
 def long_transient() -> dict[str, Callable[[], Any]]:
-    """Return a long run of the oscillator, its gradient, and that within less memory than its record needs."""
+    """Return a long run of the oscillator, its gradient, and that within less memory than its record."""
     system, span, start = oscillator(), (0.0, 4000.0), [1.0, 2.0]
     options: dict[str, Any] = {"method": "Taylor", "rtol": 1e-9, "atol": 1e-9}
 

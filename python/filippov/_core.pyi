@@ -344,7 +344,7 @@ def solve(
     options: RunOptions,
     events: list[tuple[Callable[[float, _Array], float] | TracedEvent, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]] = ...,
-    wrt: tuple[list[tuple[int, int]], list[int], int] | None = None,
+    wrt: tuple[list[tuple[int, int]], list[int], int, int | None] | None = None,
 ) -> Run: ...
 def solve_many(
     runs: Runs,
@@ -357,7 +357,7 @@ def solve_many(
     events: list[tuple[Callable[[float, _Array], float] | TracedEvent, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
-    wrt: tuple[list[tuple[int, int]], list[int], int] | None = None,
+    wrt: tuple[list[tuple[int, int]], list[int], int, int | None] | None = None,
 ) -> BaseException | None: ...
 def growth_many(
     system: TracedSystem,
