@@ -550,6 +550,7 @@ def test_random_systems_against_differences(first: int) -> None:
         7261859,  # an action at the end puts the state on a surface slid on
         1126401,  # a start at the kink of a surface
         9240021,  # a start on a surface that moves away at a tick
+        9251445,  # a start at the threshold of a law with memory
         9252182,  # changes that are zero but for rounding while two surfaces are slid on
     ],
 )
@@ -558,3 +559,14 @@ def test_random_systems_with_rare_instants(seed: int) -> None:
     found = compare(seed)
     assert not found.wrong
     assert found.n_columns >= 3
+
+
+def test_a_start_at_the_threshold_of_a_law_is_named() -> None:
+    system = fl.System(lambda t, x: [1.0 - 3.0 * fl.hysteresis(x[0], -1.0, 0.0)], n=1)
+    with pytest.warns(
+        fl.FilippovWarning, match="one_sided: the run starts at the threshold of a law with memory"
+    ):
+        system.solve((0, 0.4), [0.0], wrt="y0", **TIGHT)
+    with pytest.warns(fl.FilippovWarning, match="the gradient by the start is that of one side"):
+        fl.gradient(system, (0, 0.4), [0.0], terminal=lambda t, y: y[0], wrt="y0")
+    assert system.solve((0, 0.4), [-0.1], wrt="y0", **TIGHT).warnings == []

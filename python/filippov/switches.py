@@ -631,7 +631,7 @@ _WHY_LOST = {
 
 # The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
 # action, or a tick, is at its start, and a switch at its end.
-Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool]"
+Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool]"
 
 
 class Border(NamedTuple):
@@ -646,7 +646,7 @@ class Border(NamedTuple):
 
 def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -> list[Border]:
     """Return where the derivatives of a run are those of one side, from what the core found."""
-    starts_on, lands_on, starts_at_action, starts_at_tick, ends_at_instant = found
+    starts_on, lands_on, starts_at_action, starts_at_tick, starts_at_threshold, ends_at_instant = found
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
     if left:
@@ -660,6 +660,8 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
         borders.append(Border("starts at the very time of an action", "by the initial time"))
     if starts_at_tick:
         borders.append(Border("starts at the very time of a tick", "by the start"))
+    if starts_at_threshold:
+        borders.append(Border("starts at the threshold of a law with memory", "by the start"))
     if ends_at_instant and ends_at_given_time:
         what = "ends at the very time of a switch, which a changed run completes earlier or later"
         borders.append(Border(what, "at its end", is_end=True))

@@ -43,7 +43,14 @@ pub type SideRow<'py> = (
 
 /// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial time, does a clock tick there, and does the run end at an
 /// instant that moves?
-pub type BordersRow = (Vec<usize>, Option<(f64, Vec<usize>)>, bool, bool, bool);
+pub type BordersRow = (
+    Vec<usize>,
+    Option<(f64, Vec<usize>)>,
+    bool,
+    bool,
+    bool,
+    bool,
+);
 
 /// The same, for Python.
 pub fn borders_row(borders: &Borders) -> BordersRow {
@@ -52,6 +59,7 @@ pub fn borders_row(borders: &Borders) -> BordersRow {
         borders.lands_on.clone(),
         borders.starts_at_action,
         borders.starts_at_tick,
+        borders.starts_at_threshold,
         borders.ends_at_instant,
     )
 }

@@ -20,6 +20,8 @@ pub struct Borders {
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
     pub starts_at_tick: bool,
+    /// A law with memory starts at one of its thresholds, beside which it has another value: derivatives by the start.
+    pub starts_at_threshold: bool,
     /// The last instant is at the end, and a changed run has it later, or is then beside a surface slid on: all derivatives there.
     pub ends_at_instant: bool,
 }
@@ -245,6 +247,29 @@ pub(super) fn ticks_at_start(
         }
     }
     Ok(differ(&piece.rates(t, z)?, &earlier.rates(t, z)?))
+}
+
+/// Does a law with memory have another value, if the start is moved by a little in one of these columns?
+pub(super) fn starts_at_threshold(
+    piece: &Piece,
+    (t, z): (f64, &[f64]),
+    kinds: &[Column],
+) -> Result<bool, FieldError> {
+    let extended = piece.extended;
+    let here = extended.discrete_at(t, (&z[..extended.n], &piece.q))?;
+    for kind in kinds {
+        let Column::State(i) = *kind else {
+            continue;
+        };
+        for side in [-1.0, 1.0] {
+            let mut beside = z[..extended.n].to_vec();
+            beside[i] += side * AT_SIDE * (1.0 + beside[i].abs());
+            if extended.discrete_at(t, (&beside, &piece.q))? != here {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
 
 /// Do two vectors differ by more than rounding?

@@ -234,9 +234,17 @@ impl Extended<'_> {
         t: f64,
         (x, q): (&[f64], &[f64]),
     ) -> Result<Vec<f64>, FieldError> {
-        let earlier = t - AT_SIDE * (1.0 + t.abs());
+        self.discrete_at(t - AT_SIDE * (1.0 + t.abs()), (x, q))
+    }
+
+    /// The discrete states of a start at a point, the named ones as they are.
+    pub(super) fn discrete_at(
+        &self,
+        t: f64,
+        (x, q): (&[f64], &[f64]),
+    ) -> Result<Vec<f64>, FieldError> {
         let x = &x[..self.n - self.n_named];
-        let mut found = self.laws.start(&self.own, earlier, x)?;
+        let mut found = self.laws.start(&self.own, t, x)?;
         found[..self.n_named].copy_from_slice(&q[..self.n_named]);
         Ok(found)
     }

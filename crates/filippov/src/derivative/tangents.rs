@@ -1,7 +1,8 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{
-    differ, is_missed_later, surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders,
+    differ, is_missed_later, starts_at_threshold, surfaces_at_start, surfaces_landed_on,
+    ticks_at_start, Borders,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -169,6 +170,7 @@ impl<'a> Tangents<'a> {
         }
         let borders = &mut self.found.borders;
         borders.starts_on = starts_on;
+        borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
         self.put_back(Box::new(piece));
         self.keep(t);
