@@ -71,10 +71,9 @@ impl<'a> Checkpoint<'a> {
     pub fn n_bytes(&self) -> usize {
         let (n, d) = (self.run.x.len(), self.run.system.n_surfaces());
         let numbers = ROWS_OF_STATES * n + ROWS_OF_SURFACES * d;
-        size_of::<Self>()
-            + numbers * size_of::<f64>()
-            + self.stepper.n_bytes()
-            + self.recorder.n_bytes()
+        // The heap keeps room beside what is asked for, the more the larger the vectors are.
+        let of_motion = 2 * (numbers * size_of::<f64>() + self.stepper.n_bytes());
+        size_of::<Self>() + of_motion + self.recorder.n_bytes()
     }
 
     /// How many bytes more the latest switches may take when there are as many as are kept.

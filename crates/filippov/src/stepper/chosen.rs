@@ -30,6 +30,7 @@ macro_rules! methods {
             pub fn n_numbers(&self) -> usize {
                 let matrices = match self {
                     Chosen::Rodas5p(method) => method.n_in_matrices(),
+                    Chosen::Taylor(method) => method.n_in_rows(),
                     _ => 0,
                 };
                 2 * self.step().interpolant.coefficients().len() + matrices

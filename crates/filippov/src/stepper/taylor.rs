@@ -74,6 +74,11 @@ impl Taylor {
         }
     }
 
+    /// How many numbers its coefficients are, with those of functions of the states.
+    pub fn n_in_rows(&self) -> usize {
+        self.rows.len()
+    }
+
     /// A stepper for n states.
     pub fn new(n: usize, order: usize) -> Self {
         Taylor {
