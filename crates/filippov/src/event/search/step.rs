@@ -215,17 +215,31 @@ impl StepSearch<'_, '_> {
     /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
     /// reached to the tolerance.
     pub(crate) fn arrival_at_edge(&self) -> Result<Option<Found>, FieldError> {
-        let mut gradient = vec![0.0; self.run.x.len()];
-        for m in &self.run.motion.monitored {
+        let (run, setting) = (&self.run, self.run.motion.setting());
+        let mut gradient = vec![0.0; run.x.len()];
+        let mut h = vec![0.0; run.system.n_surfaces()];
+        for m in &run.motion.monitored {
             let Guard::Surface(j) = m.guard else {
                 continue;
             };
-            let place = self.run.motion.setting().at(self.run.t, &self.run.x);
-            self.run.system.gradient(j, &place, &mut gradient)?;
-            let tolerance = self.run.scale.along(&gradient, &self.run.x);
+            run.system
+                .gradient(j, &setting.at(run.t, &run.x), &mut gradient)?;
+            let tolerance = run.scale.along(&gradient, &run.x);
             // Where a root begins, its slope is infinite, and so is the tolerance: then nothing counts as near.
-            let is_near = tolerance.is_finite() && m.value <= tolerance;
-            if m.rate < 0.0 && is_near {
+            if m.rate >= 0.0 || !tolerance.is_finite() || m.value > tolerance {
+                continue;
+            }
+            // Beside it the slope says nothing of as far as the tolerance: the function itself does.
+            let mut x = run.x.clone();
+            for (i, (x, slope)) in x.iter_mut().zip(&gradient).enumerate() {
+                let towards = -m.orientation * slope;
+                if towards != 0.0 {
+                    *x += towards.signum() * run.scale.tolerance(i, *x, *x);
+                }
+            }
+            run.system.surfaces(&setting.at(run.t, &x), &mut h)?;
+            let stays = m.orientation * h[j] > 0.0 && m.value > 0.0;
+            if !stays {
                 return Ok(Some(Found::here(smallvec![m.guard])));
             }
         }
