@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -24,7 +23,6 @@ from filippov.app.files import FRONT, static_folder
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(fl.__file__).parents[1])}
 NET = 120_000  # for what hangs, in milliseconds
 
@@ -60,10 +58,8 @@ if __name__ == "__main__":
 
 
 def needs(*packages: str) -> None:
-    for package in ("anywidget", "playwright", *packages):
+    for package in ("anywidget", *packages):
         pytest.importorskip(package)
-    if CHROMIUM is None:
-        pytest.skip("no Chromium")
     if not (static_folder() / FRONT).is_file():
         pytest.skip("the page was not built: `make app`")
 
@@ -98,18 +94,12 @@ def served(command: list[str], folder: Path, port: int) -> Iterator[str]:
 
 
 @contextmanager
-def opened(address: str) -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        try:
-            page = browser.new_page(viewport={"width": 1400, "height": 1000})
-            page.set_default_timeout(NET)
-            page.goto(address)
-            yield page
-        finally:
-            browser.close()
+def opened(browser: Any, address: str) -> Iterator[Any]:
+    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    page.set_default_timeout(NET)
+    page.goto(address)
+    yield page
+    page.close()
 
 
 def check_widget(page: Any, moved: Path, save: Callable[[Any, str], None]) -> None:
@@ -154,17 +144,17 @@ def save(request: pytest.FixtureRequest) -> Callable[[Any, str], None]:
     return keep
 
 
-def test_in_marimo(tmp_path: Path, save: Callable[[Any, str], None]) -> None:
+def test_in_marimo(browser: Any, tmp_path: Path, save: Callable[[Any, str], None]) -> None:
     needs("marimo")
     (tmp_path / "notebook.py").write_text(MARIMO)
     port = free_port()
     command = [sys.executable, "-m", "marimo", "run", "notebook.py", "--headless", "--no-token"]
     command += ["--host", "127.0.0.1", "--port", str(port)]
-    with served(command, tmp_path, port) as address, opened(address) as page:
+    with served(command, tmp_path, port) as address, opened(browser, address) as page:
         check_widget(page, tmp_path / "moved.json", save)
 
 
-def test_in_jupyterlab(tmp_path: Path, save: Callable[[Any, str], None]) -> None:
+def test_in_jupyterlab(browser: Any, tmp_path: Path, save: Callable[[Any, str], None]) -> None:
     needs("jupyterlab", "ipykernel")
     cell = {"cell_type": "code", "id": "a", "execution_count": None, "metadata": {}, "outputs": []}
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
@@ -175,7 +165,7 @@ def test_in_jupyterlab(tmp_path: Path, save: Callable[[Any, str], None]) -> None
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1"]
     command += ["--ServerApp.token=", "--ServerApp.port_retries=0", f"--port={port}"]
     address = f"http://127.0.0.1:{port}/lab/tree/notebook.ipynb"
-    with served(command, tmp_path, port), opened(address) as page:
+    with served(command, tmp_path, port), opened(browser, address) as page:
         page.locator(".jp-Notebook .jp-CodeCell").first.click()
         page.wait_for_timeout(3000)
         page.keyboard.press("Shift+Enter")

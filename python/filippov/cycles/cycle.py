@@ -217,7 +217,7 @@ class Cycle:
         """
         itinerary, motions = self.itinerary, self._shooting.motions
         lost = [_codimension(motions, leg) for leg in itinerary.legs]
-        # Pieces that rounding alone tells apart are equally long.
+        # Durations are rounded, so that pieces of the same length compare as equal.
         shares = (-round(duration / self.period, 9) for duration in itinerary.durations)
         ranked = zip(lost, shares, strict=True)
         place = min(range(len(lost)), key=list(ranked).__getitem__)

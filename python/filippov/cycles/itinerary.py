@@ -176,7 +176,7 @@ def itinerary_from_event(record: Record, period: float, at: float | None = None)
         if at is not None and abs(t - at) > 1e-8 * period:
             continue
         lasts = instants[i + 1].times[0] - t
-        # Of pieces that rounding alone tells apart the first one counts.
+        # If several pieces have the same length up to rounding, the first one is taken.
         if best is not None and lasts <= best[0] + 1e-9 * period:
             continue
         again = _nearest(instants, instant, t + period)

@@ -229,7 +229,7 @@ impl StepSearch<'_, '_> {
             if m.rate >= 0.0 || !tolerance.is_finite() || m.value > tolerance {
                 continue;
             }
-            // Beside it the slope says nothing of as far as the tolerance: the function itself does.
+            // Close to the root the slope changes fast, so the function is evaluated at a distance of the tolerance.
             let mut x = run.x.clone();
             for (i, (x, slope)) in x.iter_mut().zip(&gradient).enumerate() {
                 let towards = -m.orientation * slope;

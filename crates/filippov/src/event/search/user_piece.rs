@@ -257,8 +257,8 @@ impl<'f> Along<'f> {
 }
 
 impl StepSearch<'_, '_> {
-    /// What its series tells of a smooth affine function up to `to`, with this value at the start; and the value
-    /// at the end of the step, NaN if `to` is before it.
+    /// The zeros up to `to` of a smooth affine function that has this value at the start, as its series tells them. The second
+    /// result is the value at the end of the step, NaN if `to` is before it.
     pub(super) fn zeros_of_affine(
         &mut self,
         parts: &dyn SmoothParts,
