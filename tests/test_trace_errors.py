@@ -421,3 +421,18 @@ def test_an_array_filled_by_a_function_without_source() -> None:
     names: dict[str, Any] = {"np": np}
     exec("def typed(t, x):\n    dx = np.zeros(2)\n    dx[0] = x[1]\n    return dx", names)
     assert "np.zeros_like(x)" in refuse(left_as_it_is(names["typed"]))
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda x: np.asarray(x, float).tobytes(),
+        lambda x: np.asarray(x, float).ctypes.data,
+        lambda x: np.asarray(x, float).data,
+        lambda x: np.array(x, dtype=float).dumps(),
+        lambda x: x.tobytes(),
+    ],
+)
+def test_the_memory_of_traced_values_is_refused(read: Callable[[Any], Any]) -> None:
+    """Their bytes are no numbers: what is made of them would be a constant of the trace."""
+    assert "the bytes of an array of traced values" in refuse(lambda t, x: [bool(read(x)) * x[1], -x[0]])

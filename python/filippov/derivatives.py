@@ -145,7 +145,8 @@ def refuse_without_derivatives(prepared: Prepared, t_span: tuple[float, float]) 
     """
     if not isinstance(prepared.core, TracedSystem):
         raise InputError(
-            f"wrt: derivatives are those of a traced function, and this one is called: {prepared.why_opaque}"
+            "wrt: derivatives are those of a traced function, and this one is called: "
+            f"{prepared.why_untraced}"
         )
     for action in prepared.actions:
         if not isinstance(action.map, TracedSystem):

@@ -17,6 +17,7 @@ from filippov.laws import without_memory
 from filippov.resets import CoreAction, Reset, check_map_value
 from filippov.scalars import real
 from filippov.trace import Trace, trace
+from filippov.trace.explain import BLACK_BOX
 from filippov.trace.fingerprint import fingerprint
 from filippov.trace.memory import remembered
 from filippov.trace.reuse import Recent
@@ -62,6 +63,11 @@ class Prepared(NamedTuple):
     actions: tuple[CoreAction, ...] = ()
     remembers: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+
+    @property
+    def why_untraced(self) -> str:
+        """Why the function could not be traced, without the advice to have it called."""
+        return self.why_opaque.replace(f"\n  - {BLACK_BOX}", "")
 
     @property
     def backend(self) -> str:

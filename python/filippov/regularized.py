@@ -43,7 +43,7 @@ def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared
     core = prepared.core
     if not isinstance(core, TracedSystem):
         raise ModelError(
-            f"regularize: a traced function is needed, and this one is called: {prepared.why_opaque}"
+            f"regularize: a traced function is needed, and this one is called: {prepared.why_untraced}"
         )
     if prepared.actions:
         names = ", ".join(repr(action.name) for action in prepared.actions)

@@ -618,7 +618,10 @@ def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switc
 
 
 _WHY_LOST = {
-    "grazing": "the motion touches the surface that ends it, and the time of that has no derivative",
+    "grazing": (
+        "the motion touches the surface that ends it, or slides to a point where the fields of both sides "
+        "are tangent to it, and the derivative of that time is not known"
+    ),
     "one-sided": "several switches come at one time, and the derivative depends on their order",
     "accumulation": (
         "the switches before the limit make no rounds that could be extrapolated, or the motion is known "
@@ -628,6 +631,8 @@ _WHY_LOST = {
     "not_finite": "a derivative is not finite",
 }
 
+
+_MOVED = "the start and by parameters that move the threshold"
 
 # The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
 # action, or a tick, is at its start, and a switch at its end.
@@ -650,7 +655,7 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
     if left:
-        borders.append(Border(f"starts on {', '.join(left)} = 0", "by the start", left))
+        borders.append(Border(f"starts on {', '.join(left)} = 0", f"by {_MOVED}", left))
     if lands_on:
         t, surfaces = lands_on
         met = tuple(names[j] for j in surfaces if j < len(names))
@@ -661,7 +666,7 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
     if starts_at_tick:
         borders.append(Border("starts at the very time of a tick", "by the start"))
     if starts_at_threshold:
-        borders.append(Border("starts at the threshold of a law with memory", "by the start"))
+        borders.append(Border("starts at the threshold of a law", f"by {_MOVED}"))
     if ends_at_instant and ends_at_given_time:
         what = "ends at the very time of a switch, which a changed run completes earlier or later"
         borders.append(Border(what, "at its end", is_end=True))

@@ -78,6 +78,16 @@ class TracedArray(np.ndarray):
         """Return the array rounded to this number of decimals."""
         return np.round(self, decimals, out=out)
 
+    def _memory(self, *args: Any, **kwargs: Any) -> Any:
+        raise NotTraceable(
+            "the bytes of an array of traced values, which are no numbers",
+            "compute with the values themselves; what depends on them in another way cannot be traced",
+        )
+
+    # The protocol of buffers calls the last one, from Python 3.12 on.
+    tobytes = tofile = dump = dumps = __reduce_ex__ = __buffer__ = _memory
+    data = ctypes = property(_memory)
+
 
 class NumberTable(np.ndarray):
     """A NumPy array of plain numbers that is indexed by traced whole numbers too.

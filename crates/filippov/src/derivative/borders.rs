@@ -12,7 +12,7 @@ use crate::vectors::dot;
 /// Why derivatives are those of one side: what the start or the end of a run coincides with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Borders {
-    /// Surfaces on which the run starts and at which the sides differ: derivatives by the start.
+    /// Surfaces on which the run starts and at which the sides differ: derivatives by the start, and by parameters of these.
     pub starts_on: Vec<usize>,
     /// The first time at which an action puts the state on surfaces at which the sides differ, and these: all derivatives from there.
     pub lands_on: Option<(f64, Vec<usize>)>,
@@ -20,7 +20,8 @@ pub struct Borders {
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
     pub starts_at_tick: bool,
-    /// A law with memory starts at one of its thresholds, beside which it has another value: derivatives by the start.
+    /// A law starts at one of its thresholds, beside which it has another value: derivatives by the start, and by parameters that
+    /// move the threshold.
     pub starts_at_threshold: bool,
     /// The last instant is at the end, and a changed run has it later, or is then beside a surface slid on: all derivatives there.
     pub ends_at_instant: bool,
@@ -230,7 +231,7 @@ pub(super) fn ticks_at_start(
     {
         return Ok(false);
     }
-    let q = extended.discrete_before(t, (&z[..extended.n], &piece.q))?;
+    let q = extended.discrete_before(t, (z, &piece.q))?;
     let mut earlier = Piece::new(around, &piece.mode, &q);
     let system = &extended.system;
     let now = piece.surfaces(t, z)?;
@@ -249,24 +250,15 @@ pub(super) fn ticks_at_start(
     Ok(differ(&piece.rates(t, z)?, &earlier.rates(t, z)?))
 }
 
-/// Does a law with memory have another value, if the start is moved by a little in one of these columns?
+/// Does a law start with another value, if the start or a threshold is moved by a little along one of these columns?
 pub(super) fn starts_at_threshold(
     piece: &Piece,
     (t, z): (f64, &[f64]),
     kinds: &[Column],
 ) -> Result<bool, FieldError> {
-    let extended = piece.extended;
-    let here = extended.discrete_at(t, (&z[..extended.n], &piece.q))?;
     for kind in kinds {
-        let Column::State(i) = *kind else {
-            continue;
-        };
-        for side in [-1.0, 1.0] {
-            let mut beside = z[..extended.n].to_vec();
-            beside[i] += side * AT_SIDE * (1.0 + beside[i].abs());
-            if extended.discrete_at(t, (&beside, &piece.q))? != here {
-                return Ok(true);
-            }
+        if piece.extended.is_at_threshold(*kind, t, (z, &piece.q))? {
+            return Ok(true);
         }
     }
     Ok(false)

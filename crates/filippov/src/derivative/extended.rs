@@ -109,6 +109,7 @@ impl Extension {
         let triggers = actions.list.iter().map(|action| action.trigger.clone());
         Ok(Some(Extended {
             values: self.parameters.iter().map(|&i| values[i]).collect(),
+            places: self.parameters.clone(),
             system: self.system.with_parameters(values.to_vec()),
             laws: Arc::clone(&self.laws),
             own: self.own.with_parameters(values.to_vec()),
@@ -166,8 +167,9 @@ pub struct Extended<'a> {
     pub(super) n: usize,
     /// How many of these are named discrete states.
     pub(super) n_named: usize,
-    /// The values of the parameters that have become states.
+    /// The values of the parameters that have become states, and their places among all.
     pub(super) values: Vec<f64>,
+    places: Vec<usize>,
     /// The map of each action; none where it leaves the states as they are.
     pub(super) maps: Vec<Option<ExtendedMap<'a>>>,
     triggers: Vec<Trigger>,
@@ -228,25 +230,49 @@ impl Extended<'_> {
             .collect()
     }
 
-    /// The discrete states just before a time at which clocks tick, at a state of the system and of the discrete states behind it.
+    /// The discrete states just before a time at which clocks tick, at an extended state, with the discrete states behind it.
     pub(super) fn discrete_before(
         &self,
         t: f64,
-        (x, q): (&[f64], &[f64]),
+        (z, q): (&[f64], &[f64]),
     ) -> Result<Vec<f64>, FieldError> {
-        self.discrete_at(t - AT_SIDE * (1.0 + t.abs()), (x, q))
+        self.discrete_at(t - AT_SIDE * (1.0 + t.abs()), (z, q))
     }
 
-    /// The discrete states of a start at a point, the named ones as they are.
-    pub(super) fn discrete_at(
-        &self,
-        t: f64,
-        (x, q): (&[f64], &[f64]),
-    ) -> Result<Vec<f64>, FieldError> {
-        let x = &x[..self.n - self.n_named];
-        let mut found = self.laws.start(&self.own, t, x)?;
+    /// The discrete states of a start at an extended state, the named ones as they are.
+    fn discrete_at(&self, t: f64, (z, q): (&[f64], &[f64])) -> Result<Vec<f64>, FieldError> {
+        let mut parameters = self.own.parameters().to_vec();
+        let moved = self.places.iter().zip(&z[self.n..]);
+        moved.for_each(|(&place, value)| parameters[place] = *value);
+        let own = self.own.with_parameters(parameters);
+        let mut found = self.laws.start(&own, t, &z[..self.n - self.n_named])?;
         found[..self.n_named].copy_from_slice(&q[..self.n_named]);
         Ok(found)
+    }
+
+    /// Does a law with thresholds start with another value, if this is moved by a little?
+    pub(super) fn is_at_threshold(
+        &self,
+        kind: Column,
+        t: f64,
+        (z, q): (&[f64], &[f64]),
+    ) -> Result<bool, FieldError> {
+        if !self.laws.have_thresholds() {
+            return Ok(false);
+        }
+        let beside = |side: f64| {
+            let (mut t, mut z) = (t, z.to_vec());
+            let entry = match kind {
+                Column::State(i) => &mut z[i],
+                Column::Parameter(p) => &mut z[self.n + p],
+                Column::Start => &mut t,
+            };
+            *entry += side * AT_SIDE * (1.0 + entry.abs());
+            self.discrete_at(t, (&z, q))
+        };
+        let (below, here, above) = (beside(-1.0)?, beside(0.0)?, beside(1.0)?);
+        let mut all = (0..here.len()).filter(|&law| self.laws.has_thresholds(law));
+        Ok(all.any(|law| below[law] != here[law] || above[law] != here[law]))
     }
 
     /// Is an action recorded as a switch?

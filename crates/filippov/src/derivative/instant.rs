@@ -17,7 +17,8 @@ use crate::vectors::dot;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Lost {
-    /// The motion touches the surface that ends it: its time has no derivative.
+    /// The motion touches the surface that ends it, or slides to a point where the fields of both sides are tangent to the surface: the
+    /// derivative of the time is not known.
     Grazing,
     /// Several guards vanish at once, and the order in which they do so counts.
     OneSided,

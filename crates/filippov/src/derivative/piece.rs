@@ -454,7 +454,7 @@ impl<'a> Piece<'a> {
     }
 
     /// The derivatives of the multiplier of a surface slid on, by the time and by the extended state; `None` where the graph has
-    /// none.
+    /// none. NaN where the jumps of the field are tangent to the surfaces: there the equations do not determine the multiplier.
     pub fn multiplier_slopes(
         &mut self,
         j: usize,
@@ -467,6 +467,7 @@ impl<'a> Piece<'a> {
         };
         self.point.copy_from_slice(z);
         self.slopes(0, t)?;
+        let normals = self.normals(t, z)?;
         let slopes = &self.nodes[0];
         let (size, l) = (z.len(), self.sliding.len());
         // dlambda_j = -w . dG with G_l^T w = e_j.
@@ -478,7 +479,17 @@ impl<'a> Piece<'a> {
         }
         let mut unit = Vector::from_elem(0.0, l);
         unit[place] = 1.0;
-        let Some(weights) = transposed.solve(&unit) else {
+        // The largest term of an entry of G_l, for the equation of each surface.
+        let largest_of = |normal: &Row| {
+            let jump = |r: usize| slopes.rows().row(r).filter(|(c, _)| *c >= size);
+            let terms = (0..size).flat_map(|r| jump(r).map(move |(_, v)| (normal[r] * v).abs()));
+            terms.fold(0.0, f64::max)
+        };
+        let is_regular = |weights: &Vector| {
+            let mut pairs = weights.iter().zip(&normals);
+            pairs.all(|(weight, normal)| (weight * largest_of(normal)).abs() < 1.0 / AT_SIDE)
+        };
+        let Some(weights) = transposed.solve(&unit).filter(is_regular) else {
             return Ok(Some((f64::NAN, Row::from_elem(f64::NAN, size))));
         };
         let (mut time, mut state) = (0.0, Row::from_elem(0.0, size));

@@ -296,6 +296,21 @@ impl Laws {
         out
     }
 
+    /// Does a discrete state start with another value on the two sides of a threshold, which is no surface of the system and no known
+    /// time? The floor of a state is the same on both sides of a change of its level.
+    pub(crate) fn has_thresholds(&self, law: usize) -> bool {
+        match self.laws[law] {
+            Law::Hysteresis { .. } | Law::Held { .. } => true,
+            Law::Piece { guard, .. } => guard.is_some(),
+            Law::Clock { .. } | Law::Level { .. } | Law::Named { .. } => false,
+        }
+    }
+
+    /// Has any?
+    pub(crate) fn have_thresholds(&self) -> bool {
+        (0..self.laws.len()).any(|law| self.has_thresholds(law))
+    }
+
     /// The discrete states at a start at (t, x).
     ///
     /// # Errors
