@@ -9,6 +9,7 @@ use crate::cube::Vector;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{shares_of_rows, Projector};
+use crate::system::is_zero_within;
 use crate::tolerances::{
     AT_SIDE, BEND_OF_CLINGING, CLOSE_TO_ROOT, HALVINGS_OF_CLINGING, MOST_CLINGING,
     PIECES_OF_CLINGING, ROUNDING,
@@ -39,11 +40,8 @@ pub(crate) fn cling(
         if !at.arrival.active[j] || at.triggers().is_only_trigger(j) {
             continue;
         }
-        let mut row = vec![0.0; at.x.len()];
-        at.system
-            .gradient(j, &at.place(at.arrival.signs), &mut row)?;
-        let tolerance = at.scale.along(&row, at.x);
-        if h[j].abs() <= tolerance && tolerance.is_finite() {
+        let place = at.place(at.arrival.signs);
+        if is_zero_within(at.system, &place, (j, h[j]), at.scale)? {
             near.push(j);
         } else if f64::from(mode.entries()[j]) * h[j] < 0.0 {
             mode.set(j, -mode.entries()[j]);

@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{shares_of_rows, Projector, SmoothField};
 use crate::status::{Warning, WarningCode};
-use crate::system::eval_on_side;
+use crate::system::{eval_on_side, is_zero_within};
 use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
 
 /// Rest, where the motions of all modes lead back to the surfaces: tried at points beside them, as far as the tolerance and
@@ -65,11 +65,10 @@ pub(crate) fn rest_within_tolerance(
 ) -> Result<Option<RestingPlace>, FieldError> {
     let signs = at.arrival.signs;
     let h = at.surface_values(notes, signs)?;
-    let mut row = vec![0.0; at.x.len()];
     let mut surfaces = Vec::new();
-    for (j, h) in h.iter().enumerate() {
-        at.system.gradient(j, &at.place(signs), &mut row)?;
-        if at.arrival.active[j] && h.abs() <= at.scale.along(&row, at.x) {
+    for (j, &h) in h.iter().enumerate() {
+        let place = at.place(signs);
+        if at.arrival.active[j] && is_zero_within(at.system, &place, (j, h), at.scale)? {
             surfaces.push(j);
         }
     }
@@ -84,6 +83,7 @@ pub(crate) fn rest_within_tolerance(
     let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
     let there = at.moved(at.t, &x);
     let h = there.surface_values(notes, signs)?;
+    let mut row = vec![0.0; at.x.len()];
     for &j in &surfaces {
         at.system.gradient(j, &there.place(signs), &mut row)?;
         let is_on = h[j].abs() <= AT_SIDE * at.scale.along(&row, at.x);

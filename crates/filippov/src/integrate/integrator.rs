@@ -26,7 +26,7 @@ use crate::mode::Mode;
 use crate::motion::{Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
-use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
+use crate::stepper::{shortest_step, Attempt, StepControl, Steppers, Stiff};
 use crate::system::Trigger;
 use crate::tolerances::{EPS, ROUNDING};
 
@@ -215,10 +215,8 @@ impl<'a> Integrator<'a> {
             }
         }
         let room = (remaining, self.horizon >= self.t_end);
-        let dt = self
-            .control
-            .next(&self.run.motion, room, self.run.options.max_step);
-        let shortest = (ROUNDING * self.run.t.abs()).max(f64::MIN_POSITIVE);
+        let dt = self.control.next(&self.run, room);
+        let shortest = shortest_step(self.run.t);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, lost_guards)?;
             if let Some(lost) = lost {
@@ -244,7 +242,7 @@ impl<'a> Integrator<'a> {
         match attempt {
             Attempt::NotFinite => {
                 self.run.stats.reject(sliding);
-                self.control.shorten_to_surface(dt, &self.run.motion);
+                self.control.shorten_to_surface(dt, &self.run);
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {

@@ -7,10 +7,10 @@ use super::pace::{excursion, Paces};
 use super::stiffness::{Stiff, Stiffness};
 use super::{Controller, Steppers};
 use crate::error::FieldError;
-use crate::motion::{CurrentMotion, Leading, ModeField, Monitored, Run};
+use crate::motion::{Leading, ModeField, Monitored, Run};
 use crate::options::Method;
 use crate::status::{Stop, Warning, WarningCode};
-use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, SMALLEST_GUESS};
+use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, ROUNDING, SMALLEST_GUESS};
 
 /// The control of the step: the proposed length, and what was seen of the steps before.
 #[derive(Clone)]
@@ -172,16 +172,11 @@ impl StepControl {
         Ok(None)
     }
 
-    /// The length of the next step, at most `max_step` and the time that `remains` up to the next known time, which is the end
+    /// The length of the next step, at most `max_step` of the options and the time that `remains` up to the next known time, which is the end
     /// of the run or not.
     #[inline(always)]
-    pub fn next(
-        &mut self,
-        motion: &CurrentMotion,
-        (remains, is_end): (f64, bool),
-        max_step: f64,
-    ) -> f64 {
-        let dt = self.aim_at_surface(self.dt.min(max_step), &motion.monitored);
+    pub fn next(&mut self, at: &Run, (remains, is_end): (f64, bool)) -> f64 {
+        let dt = self.aim_at_surface(self.dt.min(at.options.max_step), at);
         self.wanted = 0.0;
         if dt < remains * 0.99 {
             return dt;
@@ -194,11 +189,11 @@ impl StepControl {
 
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
     /// from the start, close enough for the continuous extension to reach it.
-    fn aim_at_surface(&mut self, dt: f64, monitored: &[Monitored]) -> f64 {
+    fn aim_at_surface(&mut self, dt: f64, at: &Run) -> f64 {
         if !self.meets_edges || self.one_sided {
             return dt;
         }
-        let nearest = nearest_surface(monitored);
+        let nearest = nearest_surface(at);
         if nearest > dt {
             return dt;
         }
@@ -213,16 +208,16 @@ impl StepControl {
 
     /// After a step that was not finite: aims at the surface that the motion approaches, or shortens
     /// the step if it did so already.
-    pub fn shorten_to_surface(&mut self, dt: f64, motion: &CurrentMotion) {
+    pub fn shorten_to_surface(&mut self, dt: f64, at: &Run) {
         self.controller.not_finite();
-        if let ModeField::Intersection(field) = &motion.field {
+        if let ModeField::Intersection(field) = &at.motion.field {
             if field.is_rootless() {
                 // No edge of the field: the multipliers end, or move fast.
                 self.dt = 0.5 * dt;
                 return;
             }
         }
-        let aim = ONE_SIDED_AIM * nearest_surface(&motion.monitored);
+        let aim = ONE_SIDED_AIM * nearest_surface(at);
         let aims = !self.one_sided && aim < dt;
         self.dt = if aims { aim } else { 0.5 * dt };
         self.one_sided = true;
@@ -356,8 +351,17 @@ impl StepControl {
     }
 }
 
-/// Predicted time to the next zero of what is monitored.
-fn nearest_surface(monitored: &[Monitored]) -> f64 {
-    let times = monitored.iter().map(Monitored::time_to_zero);
-    times.fold(f64::INFINITY, f64::min)
+/// The shortest step from this time: below it the time does not move.
+pub(crate) fn shortest_step(t: f64) -> f64 {
+    (ROUNDING * t.abs()).max(f64::MIN_POSITIVE)
+}
+
+/// Predicted time to the next zero of what is monitored. A prediction below the shortest step is left out: beside a root a
+/// function far from zero has a slope by which it would vanish at once.
+fn nearest_surface(at: &Run) -> f64 {
+    let times = at.motion.monitored.iter().map(Monitored::time_to_zero);
+    let shortest = shortest_step(at.t);
+    times
+        .filter(|time| ONE_SIDED_AIM * time >= shortest)
+        .fold(f64::INFINITY, f64::min)
 }

@@ -27,7 +27,7 @@ mod stiffness;
 mod taylor;
 
 pub use crate::error_scale::ErrorScale;
-pub(crate) use control::StepControl;
+pub(crate) use control::{shortest_step, StepControl};
 pub use controller::Controller;
 pub(crate) use dense::{derivative, evaluate, powers_of_nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};

@@ -4,6 +4,7 @@ use smallvec::SmallVec;
 
 use super::{PiecewiseSystem, Place};
 use crate::error::FieldError;
+use crate::error_scale::ErrorScale;
 use crate::tolerances::{EPS, OFFSET_ROUNDING, SIDE_OFFSET, SIDE_REACH, STEPS_INSIDE};
 
 /// Moves a point that lies on surfaces up to rounding into the region of `signs`: off every surface
@@ -139,4 +140,35 @@ pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
         }
     }
     Ok(evaluations)
+}
+
+/// Is the function of surface `j`, with this `value` here, zero up to the tolerance of the state? By its slope, and then by its
+/// value at the distance of the tolerance: beside a root the slope of a function far from zero is huge, and where the root
+/// begins it is infinite.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn is_zero_within<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    place: &Place<'_>,
+    (j, value): (usize, f64),
+    scale: &ErrorScale,
+) -> Result<bool, FieldError> {
+    let mut gradient = vec![0.0; place.x.len()];
+    system.gradient(j, place, &mut gradient)?;
+    let tolerance = scale.along(&gradient, place.x);
+    if !tolerance.is_finite() || value.abs() > tolerance {
+        return Ok(false);
+    }
+    let mut x = place.x.to_vec();
+    for (i, (x, slope)) in x.iter_mut().zip(&gradient).enumerate() {
+        let towards = -value * slope;
+        if towards != 0.0 {
+            *x += towards.signum() * scale.tolerance(i, *x, *x);
+        }
+    }
+    let mut h = vec![0.0; system.n_surfaces()];
+    system.surfaces(&place.moved(place.t, &x), &mut h)?;
+    let keeps_sign = value * h[j] > 0.0;
+    Ok(!keeps_sign)
 }

@@ -17,6 +17,7 @@ use crate::event::{Event, Found};
 use crate::motion::{AffineBounds, Guard, ModeField, Monitored};
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
+use crate::system::is_zero_within;
 use crate::tolerances::{
     EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH, SPARE_SPREAD,
 };
@@ -216,30 +217,16 @@ impl StepSearch<'_, '_> {
     /// reached to the tolerance.
     pub(crate) fn arrival_at_edge(&self) -> Result<Option<Found>, FieldError> {
         let (run, setting) = (&self.run, self.run.motion.setting());
-        let mut gradient = vec![0.0; run.x.len()];
-        let mut h = vec![0.0; run.system.n_surfaces()];
         for m in &run.motion.monitored {
             let Guard::Surface(j) = m.guard else {
                 continue;
             };
-            run.system
-                .gradient(j, &setting.at(run.t, &run.x), &mut gradient)?;
-            let tolerance = run.scale.along(&gradient, &run.x);
-            // Where a root begins, its slope is infinite, and so is the tolerance: then nothing counts as near.
-            if m.rate >= 0.0 || !tolerance.is_finite() || m.value > tolerance {
+            // Where a root begins the slope is infinite: then nothing counts as near.
+            if !(m.rate < 0.0 && m.rate.is_finite()) {
                 continue;
             }
-            // Close to the root the slope changes fast, so the function is evaluated at a distance of the tolerance.
-            let mut x = run.x.clone();
-            for (i, (x, slope)) in x.iter_mut().zip(&gradient).enumerate() {
-                let towards = -m.orientation * slope;
-                if towards != 0.0 {
-                    *x += towards.signum() * run.scale.tolerance(i, *x, *x);
-                }
-            }
-            run.system.surfaces(&setting.at(run.t, &x), &mut h)?;
-            let stays = m.orientation * h[j] > 0.0 && m.value > 0.0;
-            if !stays {
+            let (place, value) = (setting.at(run.t, &run.x), m.orientation * m.value);
+            if m.value <= 0.0 || is_zero_within(run.system, &place, (j, value), &run.scale)? {
                 return Ok(Some(Found::here(smallvec![m.guard])));
             }
         }
