@@ -167,14 +167,58 @@ def test_wrong_orders_are_refused() -> None:
         system.solve((0, 1), [1.0, 2.0], wrt="y0").derivative(order=3)
 
 
+def itinerary(sol: fl.Solution) -> list[str]:
+    return [str(segment.mode) for segment in sol.segments]
+
+
+def test_sliding_on_two_curved_surfaces_one_of_which_moves() -> None:
+    """The signs multiply one another, also in the equations of the multipliers."""
+
+    def fun(t: float, x: Any, a: float = 0.3, b: float = 0.5) -> list[Any]:
+        u, v = np.sign(x[0] ** 2 + x[1] ** 2 - 1 - a * np.sin(t)), np.sign(x[2] - b * x[0])
+        first, second = -2 * x[0] * u + b + 0.2 * v * x[1], -2 * x[1] * u + np.cos(b * t) + 0.1 * v
+        return [first, second, 0.3 * u * x[0] - 1.5 * v + 0.2 * u * v]
+
+    system = fl.System(fun, n=3)
+    assert itinerary(system.solve((0, 2.5), [0.3, 0.4, 0.5])) == ["-+", "-0", "00"]
+    check(system, (0.0, 2.5), [0.3, 0.4, 0.5], 1e-8)
+
+
+def test_sliding_on_three_surfaces() -> None:
+    def fun(t: float, x: Any, a: float = 0.3) -> list[Any]:
+        u, v, w = np.sign(x[0]), np.sign(x[1] - a * x[3]), np.sign(x[2] + 0.1 * x[3] ** 2)
+        first, second = -2 * u + 0.3 * v + a * x[3], -2 * v + 0.2 * w * x[3]
+        return [first, second, -2 * w + 0.1 * u + np.sin(x[3]), 1 + 0.2 * u * x[3] + 0.3 * v * w]
+
+    system = fl.System(fun, n=4)
+    assert itinerary(system.solve((0, 1.2), [0.3, 0.5, 0.6, 0.1]))[-1] == "000"
+    check(system, (0.0, 1.2), [0.3, 0.5, 0.6, 0.1], 1e-8)
+
+
+def test_two_masses_that_stick_and_slip() -> None:
+    def fun(t: float, x: Any, F: float = 0.6, k: float = 1.2) -> list[Any]:
+        pull = k * (x[1] - x[0])
+        first = -x[0] + pull - F * np.sign(x[2]) + 0.7 * np.sin(t)
+        return [x[2], x[3], first, -pull - 0.5 * F * np.sign(x[3])]
+
+    system = fl.System(fun, n=4)
+    assert "00" in itinerary(system.solve((0, 11), [1.0, -0.5, 0.2, 0.1]))[:-1]
+    check(system, (0.0, 11.0), [1.0, -0.5, 0.2, 0.1])
+
+
 def test_where_second_derivatives_end_is_named() -> None:
     def two(t: float, x: Any) -> list[Any]:
         return [0.5 - np.sign(x[0]), 0.2 + 0.1 * np.sign(x[0]) - np.sign(x[1]), np.sign(x[0]) * x[2]]
 
-    with pytest.warns(fl.FilippovWarning, match="second derivatives are not known from t ="):
-        sol = fl.System(two, n=3).solve((0, 3), [0.3, 0.2, 1.0], wrt="y0", order=2)
+    with pytest.warns(fl.FilippovWarning, match=r"second derivatives are not known .*: the run starts on a"):
+        sol = fl.System(two, n=3).solve((0, 3), [0.0, 0.2, 1.0], wrt="y0", order=2)
     assert np.isfinite(sol.derivative()).all()
     assert np.isnan(sol.derivative(order=2)).all()
+    floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], direction="down")
+    body = fl.System(lambda t, x: [x[1], -2 * np.cos(2 * t)], n=2, resets=floor)
+    with pytest.warns(fl.FilippovWarning, match=r"second derivatives are not known .* not in contact"):
+        sol = body.solve((0, 0.6), [0.1, 0.0], wrt="y0", order=2)
+    assert np.isfinite(sol.derivative()).all()
 
 
 def test_clocks_whose_periods_are_parameters() -> None:

@@ -632,6 +632,19 @@ _WHY_LOST = {
 }
 
 
+_WHY_SECOND_LOST = {
+    "start": "the run starts on a surface that it slides on",
+    "arrival": "an action puts the state beside a surface that the motion slides on",
+    "accumulation": "infinitely many switches are jumped over",
+    "motion": (
+        "they are followed in regions and on surfaces slid on by Filippov's rule, and not in contact, at "
+        "rest or in sliding of higher order"
+    ),
+    "instant": (
+        "several functions fix the time of the instant, or one that is no surface and where the field jumps"
+    ),
+}
+
 _MOVED = "the start and by parameters that move the threshold"
 
 # The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
@@ -686,9 +699,10 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
         text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"
         found.append(RunWarning(t, "no_derivative", text))
     second = run.second_lost()
-    if second is not None and (lost is None or second < lost[0]):
-        text = f"second derivatives are not known from t = {second:.10g} on"
-        found.append(RunWarning(second, "no_derivative", text))
+    if second is not None and (lost is None or second[0] < lost[0]):
+        t, why = second
+        text = f"second derivatives are not known from t = {t:.10g} on: {_WHY_SECOND_LOST[why]}"
+        found.append(RunWarning(t, "no_derivative", text))
     return found
 
 

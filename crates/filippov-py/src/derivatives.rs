@@ -252,8 +252,9 @@ impl RunDerivatives {
     }
 
     /// The time from which on second derivatives are not known.
-    pub fn second_lost(&self) -> Option<f64> {
-        self.found.second_lost
+    pub fn second_lost(&self) -> Option<(f64, &'static str)> {
+        let lost = self.found.second_lost;
+        lost.map(|(t, why)| (t, why.name()))
     }
 
     /// The derivatives of the times of zeros of a function, the first component of a system: a row for each.

@@ -654,7 +654,7 @@ impl Run {
     }
 
     /// The time from which on second derivatives are not known.
-    fn second_lost(&self) -> Option<f64> {
+    fn second_lost(&self) -> Option<(f64, &'static str)> {
         self.derivatives.as_ref()?.second_lost()
     }
 

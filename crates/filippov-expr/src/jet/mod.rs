@@ -78,7 +78,7 @@ impl JetProgram {
         JetProgram::with_multipliers(graph, field, functions, &multipliers, order, backend)
     }
 
-    /// The same where some signs are multipliers, which keep functions at zero.
+    /// The same where some leaves are multipliers, which keep functions at zero.
     ///
     /// # Errors
     /// As for [`compile`](Self::compile).

@@ -7,14 +7,13 @@
 use rustc_hash::FxHashMap;
 
 use super::plan::{Plan, Row, Rule};
-use crate::graph::Graph;
-use crate::node::{Node, NodeId};
+use crate::node::NodeId;
 
-/// Signs that are solved for.
+/// Leaves that are solved for.
 #[derive(Debug, Clone, Default)]
 pub struct Multipliers {
-    /// The surfaces whose signs they are, and their values at the start, inputs of the program.
-    pub signs: Vec<(u32, NodeId)>,
+    /// The leaves, such as signs, and their values at the start, inputs of the program.
+    pub unknowns: Vec<(NodeId, NodeId)>,
     /// What they keep at zero, as many functions.
     pub equations: Vec<NodeId>,
     /// The inverse of the derivatives of the equations by the multipliers: for each multiplier, the equations that
@@ -24,30 +23,27 @@ pub struct Multipliers {
 
 impl Multipliers {
     /// All nodes that a plan has to have rows for.
-    pub(super) fn nodes(&self, graph: &mut Graph) -> Vec<NodeId> {
+    pub(super) fn nodes(&self) -> Vec<NodeId> {
         let mut nodes = Vec::new();
-        for &(j, start) in &self.signs {
-            nodes.extend([graph.sign_of(j), start]);
+        for &(unknown, start) in &self.unknowns {
+            nodes.extend([unknown, start]);
         }
         nodes.extend(&self.equations);
         nodes.extend(self.inverse.iter().flatten().map(|(_, entry)| entry));
         nodes
     }
 
-    /// The start of a sign that is a multiplier.
-    pub(super) fn start(&self, node: Node) -> Option<NodeId> {
-        let Node::Sign(j) = node else { return None };
-        self.signs
-            .iter()
-            .find(|sign| sign.0 == j)
-            .map(|sign| sign.1)
+    /// The start of a leaf that is a multiplier.
+    pub(super) fn start(&self, node: NodeId) -> Option<NodeId> {
+        let mut unknowns = self.unknowns.iter();
+        unknowns.find(|known| known.0 == node).map(|known| known.1)
     }
 
     /// How each multiplier is solved for, in rows.
-    pub(super) fn solved(&self, graph: &mut Graph, rows: &FxHashMap<NodeId, Row>) -> Vec<Solved> {
-        let each = self.signs.iter().zip(&self.inverse);
-        each.map(|(&(j, _), entries)| Solved {
-            row: rows[&graph.sign_of(j)],
+    pub(super) fn solved(&self, rows: &FxHashMap<NodeId, Row>) -> Vec<Solved> {
+        let each = self.unknowns.iter().zip(&self.inverse);
+        each.map(|((unknown, _), entries)| Solved {
+            row: rows[unknown],
             terms: entries
                 .iter()
                 .map(|(equation, entry)| (rows[&self.equations[*equation]], rows[entry]))

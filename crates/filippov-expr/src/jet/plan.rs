@@ -132,7 +132,7 @@ impl Plan {
         multipliers: &Multipliers,
     ) -> Result<Self, ExprError> {
         let mut outputs: Vec<NodeId> = field.iter().chain(functions).copied().collect();
-        outputs.extend(multipliers.nodes(graph));
+        outputs.extend(multipliers.nodes());
         let schedule = Schedule::new(graph, &outputs)?;
         let mut plan = Plan {
             rules: Vec::with_capacity(schedule.order.len()),
@@ -147,7 +147,7 @@ impl Plan {
         plan.lengths.states = plan.lengths.states.max(field.len());
         for &id in &schedule.order {
             let node = *graph.node(id);
-            let row = match multipliers.start(node) {
+            let row = match multipliers.start(id) {
                 Some(start) => plan.push(Rule::Multiplier(start)),
                 None => plan.row_of(id, node),
             };
@@ -155,7 +155,7 @@ impl Plan {
         }
         plan.field = field.iter().map(|id| plan.rows[id]).collect();
         plan.functions = functions.iter().map(|id| plan.rows[id]).collect();
-        plan.rounds = Rounds::new(&plan, multipliers.solved(graph, &plan.rows));
+        plan.rounds = Rounds::new(&plan, multipliers.solved(&plan.rows));
         Ok(plan)
     }
 

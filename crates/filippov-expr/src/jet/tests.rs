@@ -178,7 +178,7 @@ fn multipliers_keep_their_equations_at_zero() {
     let dz = g.sub(first, pull);
     let inputs: Vec<NodeId> = (0..6).map(|i| g.input(i)).collect();
     let multipliers = Multipliers {
-        signs: vec![(0, inputs[0]), (1, inputs[1])],
+        unknowns: vec![(first, inputs[0]), (second, inputs[1])],
         equations: vec![dx, dy],
         inverse: vec![
             vec![(0, inputs[2]), (1, inputs[3])],

@@ -2,7 +2,7 @@
 
 use filippov_expr::{Backend, ExprError, Graph, NodeId, Program};
 
-use crate::system::{sides_of, Place, TracedSystem};
+use crate::system::{derivative_along, sides_of, Place, TracedSystem};
 use crate::vectors::dot;
 
 /// Mixed derivatives of the state by two columns, n entries for each pair.
@@ -106,19 +106,6 @@ impl MapAt<'_> {
         rows.map(|((row, by_time), bend)| dot(&row[..self.n], q) + by_time * tau + bend)
             .collect()
     }
-}
-
-/// The derivative of a value along a change of the states.
-pub(super) fn derivative_along(graph: &mut Graph, value: NodeId, change: &[NodeId]) -> NodeId {
-    let gradient = graph.gradient(value);
-    let mut sum = graph.constant(0.0);
-    for (k, partial) in gradient.states {
-        if let Some(&own) = change.get(k as usize) {
-            let term = graph.mul(partial, own);
-            sum = graph.add(sum, term);
-        }
-    }
-    sum
 }
 
 /// Adds a multiple of a row.

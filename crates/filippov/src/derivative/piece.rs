@@ -100,6 +100,8 @@ pub(super) struct Piece<'a> {
     jacobian: Option<Arc<MotionJacobian>>,
     /// Is the field affine in the signs of the surfaces slid on?
     pub is_affine: bool,
+    /// Does its field follow from the graph alone?
+    pub by_graph: bool,
     /// The series of its changes, if it has any.
     series: Option<Arc<ChangeSeries>>,
     coefficients: Coefficients,
@@ -162,6 +164,7 @@ impl<'a> Piece<'a> {
             field,
             jacobian,
             is_affine: is_affine(&extended.system, &sliding),
+            by_graph,
             series: match by_graph {
                 true => extended.series(&sliding, around.order, false),
                 false => None,
@@ -305,12 +308,11 @@ impl<'a> Piece<'a> {
         columns: &[Vec<f64>],
         second: &mut Second,
     ) -> Result<bool, FieldError> {
-        let (n, system) = (self.extended.n, &self.extended.system);
-        let order = self.order;
-        let series = self
-            .series
-            .as_ref()
-            .and_then(|_| self.extended.series(&self.sliding, order, true));
+        let n = self.extended.n;
+        let series = match self.by_graph {
+            true => self.extended.series(&self.sliding, self.order, true),
+            false => None,
+        };
         let Some(series) = series else {
             return Ok(false);
         };
@@ -320,9 +322,10 @@ impl<'a> Piece<'a> {
             let (mut t, mut left) = (t0, t1 - t0);
             while left > 0.0 {
                 path(t, &mut self.point[..n])?;
-                let place = Setting::new(&self.signs, &self.q).at(t, &self.point);
+                self.take_multipliers(t)?;
+                let place = Setting::new(&self.node_signs, &self.q).at(t, &self.point);
                 let size = (n, self.rtol, SHORTEST_OF_PAIRS);
-                let motion = (system, &place);
+                let motion = (&self.extended.system, &place);
                 match series.carry(motion, size, left, &mut changes, &mut self.coefficients) {
                     Some(rest) => (t, left) = (t1 - rest, rest),
                     None => return Ok(false),
@@ -411,21 +414,29 @@ impl<'a> Piece<'a> {
         let Some(jacobian) = &self.jacobian else {
             return self.slopes_by_differences(node, t);
         };
-        self.node_signs.copy_from_slice(&self.signs);
-        if !self.sliding.is_empty() {
-            let (z, system) = (&mut self.point, &self.extended.system);
-            let place = Setting::new(&self.signs, &self.q).at(t, z);
-            let ratios = self.sliding.iter().map(|&j| system.stick_ratio(j, &place));
-            let ratios: SmallVec<[f64; 4]> = ratios.collect();
-            self.field.eval_unprojected(t, z, &mut self.rates)?;
-            let multipliers = self.field.multipliers();
-            for (k, (&j, ratio)) in self.sliding.iter().zip(ratios).enumerate() {
-                self.node_signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
-            }
-        }
+        let jacobian = Arc::clone(jacobian);
+        self.take_multipliers(t)?;
         let place = Setting::new(&self.node_signs, &self.q).at(t, &self.point);
         let system = &self.extended.system;
-        system.eval_jacobian(jacobian, &place, &mut self.nodes[node]);
+        system.eval_jacobian(&jacobian, &place, &mut self.nodes[node]);
+        Ok(())
+    }
+
+    /// Finds the multipliers at the point, as signs of the surfaces slid on.
+    fn take_multipliers(&mut self, t: f64) -> Result<(), FieldError> {
+        self.node_signs.copy_from_slice(&self.signs);
+        if self.sliding.is_empty() {
+            return Ok(());
+        }
+        let (z, system) = (&mut self.point, &self.extended.system);
+        let place = Setting::new(&self.signs, &self.q).at(t, z);
+        let ratios = self.sliding.iter().map(|&j| system.stick_ratio(j, &place));
+        let ratios: SmallVec<[f64; 4]> = ratios.collect();
+        self.field.eval_unprojected(t, z, &mut self.rates)?;
+        let multipliers = self.field.multipliers();
+        for (k, (&j, ratio)) in self.sliding.iter().zip(ratios).enumerate() {
+            self.node_signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
+        }
         Ok(())
     }
 

@@ -2,13 +2,16 @@
 
 use filippov_expr::{Backend, Graph, JetProgram, Multipliers, NodeId};
 
-use super::forms::derivative_along;
-use crate::system::{sliding_field, Place, Tiered, TracedSystem};
+use crate::system::{
+    derivative_along, sliding_field, MultiplierEquations, Place, Tiered, TracedSystem,
+};
 
 /// The series of a motion of a traced system with those of its changes, in a region or on one surface: of one change, or of two with
-/// the mixed second derivative along them.
+/// the mixed second derivative along them. The latter there are on several surfaces too.
 pub(super) struct ChangeSeries {
     program: Tiered<JetProgram>,
+    /// Of the multipliers of several surfaces, and of their changes.
+    equations: Option<MultiplierEquations>,
     order: usize,
     /// How many states the system has, and how many changes of these there are.
     size: usize,
@@ -24,7 +27,7 @@ pub(super) struct Coefficients {
 }
 
 impl ChangeSeries {
-    /// Of the motions on these surfaces; `None` if there are more than one.
+    /// Of the motions on these surfaces; `None` if there are several, and one change.
     pub fn new(
         system: &TracedSystem,
         sliding: &[usize],
@@ -33,37 +36,35 @@ impl ChangeSeries {
     ) -> Option<Self> {
         let mut graph = system.graph().clone();
         let size = system.field_nodes().len();
-        let mut field = match *sliding {
-            [] => system.field_nodes().to_vec(),
-            [j] => sliding_field(&mut graph, system.field_nodes(), j).0,
+        let n_changes = if of_pairs { 3 } else { 1 };
+        let changes: Vec<Vec<NodeId>> = (1..=n_changes)
+            .map(|k| {
+                let states = size * k..size * (k + 1);
+                states.map(|i| graph.state(i as u32)).collect()
+            })
+            .collect();
+        let (mut equations, mut multipliers) = (None, Multipliers::default());
+        let field = match (sliding, &changes[..]) {
+            ([], _) => with_changes(&mut graph, system.field_nodes().to_vec(), &changes),
+            (&[j], _) => {
+                let field = sliding_field(&mut graph, system.field_nodes(), j).0;
+                with_changes(&mut graph, field, &changes)
+            }
+            (_, [a, b, mixed]) => {
+                let (field, backend) = (system.field_nodes(), Backend::Native);
+                let changes = [a.clone(), b.clone(), mixed.clone()];
+                let made = MultiplierEquations::with_changes(
+                    &mut graph, field, sliding, &changes, backend,
+                )?;
+                (equations, multipliers) = (Some(made.0), made.2);
+                made.1
+            }
             _ => return None,
         };
-        let own = field.clone();
-        let n_changes = if of_pairs { 3 } else { 1 };
-        let mut along = Vec::with_capacity(n_changes);
-        for k in 0..n_changes {
-            let change: Vec<NodeId> = (0..size)
-                .map(|i| graph.state((size * (k + 1) + i) as u32))
-                .collect();
-            let rates = own
-                .iter()
-                .map(|&rate| derivative_along(&mut graph, rate, &change));
-            along.push((rates.collect::<Vec<_>>(), change.clone()));
-        }
-        if let [_, (_, first), _] = &along[..] {
-            let bends: Vec<NodeId> = along[0]
-                .0
-                .iter()
-                .map(|&rate| derivative_along(&mut graph, rate, first))
-                .collect();
-            for (rate, bend) in along[2].0.iter_mut().zip(bends) {
-                *rate = graph.add(*rate, bend);
-            }
-        }
-        field.extend(along.into_iter().flat_map(|(rates, _)| rates));
-        let make = move |backend| compile(&graph, &field, order, backend);
+        let make = move |backend| compile(&graph, &field, &multipliers, order, backend);
         Some(ChangeSeries {
             program: Tiered::from(make, Backend::Native),
+            equations,
             order,
             size,
             n_changes,
@@ -94,7 +95,8 @@ impl ChangeSeries {
             x: &room.start,
             ..*place
         };
-        system.eval_series(self.program.program(), &at, &mut room.rows);
+        let equations = self.equations.as_ref();
+        system.eval_series(self.program.program(), equations, &at, &mut room.rows);
         if !room.rows[self.order * width..]
             .iter()
             .all(|c| c.is_finite())
@@ -148,9 +150,33 @@ fn largest(entries: &[f64]) -> f64 {
     entries.iter().fold(0.0, |most, c| c.abs().max(most))
 }
 
-fn compile(graph: &Graph, field: &[NodeId], order: usize, backend: Backend) -> JetProgram {
-    let none = Multipliers::default();
-    let with = |backend| JetProgram::with_multipliers(graph, field, &[], &none, order, backend);
+/// A field with the rates of changes behind it: of one, or of two and of the mixed one of both.
+fn with_changes(graph: &mut Graph, field: Vec<NodeId>, changes: &[Vec<NodeId>]) -> Vec<NodeId> {
+    let mut along = |values: &[NodeId], change: &[NodeId]| -> Vec<NodeId> {
+        let rates = values.iter();
+        rates
+            .map(|&rate| derivative_along(graph, rate, change))
+            .collect()
+    };
+    let mut rates: Vec<Vec<NodeId>> = changes.iter().map(|own| along(&field, own)).collect();
+    if let [first, _, mixed] = &mut rates[..] {
+        let bends = along(first, &changes[1]);
+        for (rate, bend) in mixed.iter_mut().zip(bends) {
+            *rate = graph.add(*rate, bend);
+        }
+    }
+    [field, rates.concat()].concat()
+}
+
+fn compile(
+    graph: &Graph,
+    field: &[NodeId],
+    multipliers: &Multipliers,
+    order: usize,
+    backend: Backend,
+) -> JetProgram {
+    let with =
+        |backend| JetProgram::with_multipliers(graph, field, &[], multipliers, order, backend);
     with(backend)
         .or_else(|_| with(Backend::Interpreter))
         .expect("the interpreter refuses only nodes of another graph")

@@ -33,12 +33,41 @@ pub struct Derivatives {
     /// The mixed second derivatives at each of them, if they are followed: for every pair of columns (a, b) with b <= a, in order, those
     /// of the state. NaN where they are not known.
     pub second: Vec<f64>,
-    /// The time from which on the second derivatives are not known.
-    pub second_lost: Option<f64>,
+    /// The time from which on the second derivatives are not known, and why.
+    pub second_lost: Option<(f64, SecondLost)>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
     /// Where they are those of one side.
     pub borders: Borders,
+}
+
+/// Why second derivatives are not known from a time on, from which first ones may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SecondLost {
+    /// The run starts on surfaces slid on.
+    Start,
+    /// An action puts the state beside surfaces slid on.
+    Arrival,
+    /// Infinitely many switches were jumped over.
+    Accumulation,
+    /// The motion has no Taylor series of its changes.
+    Motion,
+    /// The formula of an instant does not hold: several functions fix its time, or a guard that is no surface, where the field jumps.
+    Instant,
+}
+
+impl SecondLost {
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            SecondLost::Start => "start",
+            SecondLost::Arrival => "arrival",
+            SecondLost::Accumulation => "accumulation",
+            SecondLost::Motion => "motion",
+            SecondLost::Instant => "instant",
+        }
+    }
 }
 
 /// Follows the derivatives of a run, step by step and through its instants. Where they end they are NaN.
@@ -83,8 +112,9 @@ pub struct Tangents<'a> {
     /// The same before an instant.
     columns_before: Vec<Vec<f64>>,
     has_second: bool,
-    /// The mixed derivatives, as long as they are known.
+    /// The mixed derivatives, as long as they are known, and why they are not.
     second: Option<Second>,
+    second_lost: SecondLost,
     /// Motions that were met, the latest last. They are moved in and out.
     #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
@@ -116,6 +146,7 @@ impl<'a> Tangents<'a> {
             kept: options.keep,
             has_second: false,
             second: None,
+            second_lost: SecondLost::Instant,
             kinds,
             pieces: Vec::new(),
             history: History::default(),
@@ -165,7 +196,7 @@ impl<'a> Tangents<'a> {
         self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
         let starts_on = surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
-            self.second = None;
+            self.drop_second(SecondLost::Start);
             self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
         }
         let borders = &mut self.found.borders;
@@ -175,6 +206,12 @@ impl<'a> Tangents<'a> {
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
+    }
+
+    fn drop_second(&mut self, why: SecondLost) {
+        if self.second.take().is_some() {
+            self.second_lost = why;
+        }
     }
 
     fn keep(&mut self, t: f64) {
@@ -193,7 +230,8 @@ impl<'a> Tangents<'a> {
             match &self.second {
                 Some(second) => self.found.second.extend(second.pairs.iter().flatten()),
                 None => {
-                    self.found.second_lost.get_or_insert(t);
+                    let lost = (t, self.second_lost);
+                    self.found.second_lost.get_or_insert(lost);
                     let unknown = pairs(self.kinds.len()).flat_map(|_| vec![f64::NAN; n]);
                     self.found.second.extend(unknown);
                 }
@@ -263,9 +301,9 @@ impl<'a> Tangents<'a> {
                 extended.write_with_named(x, step.discrete, |x| step.at(t, x));
                 Ok(())
             };
-            if let Some(mut second) = self.second.take() {
-                if piece.advance_pairs(along, (t0, t1), &self.columns, &mut second)? {
-                    self.second = Some(second);
+            if let Some(second) = &mut self.second {
+                if !piece.advance_pairs(along, (t0, t1), &self.columns, second)? {
+                    self.drop_second(SecondLost::Motion);
                 }
             }
             piece.advance(along, (t0, t1), &mut self.columns)?;
@@ -295,8 +333,11 @@ impl<'a> Tangents<'a> {
             before: &mut before,
             after: &mut after,
         };
+        let had_second = self.second.is_some();
         if record.t[0] != record.t[1] {
-            self.second = None;
+            if self.second.take().is_some() {
+                self.second_lost = SecondLost::Accumulation;
+            }
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {
@@ -304,6 +345,14 @@ impl<'a> Tangents<'a> {
             let all = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
             if let Some(last) = all.last() {
                 self.history.push(record, &self.columns_before, &last.dt);
+            }
+            if had_second && self.second.is_none() {
+                let arrives = all.iter().any(|found| found.arrives);
+                self.second_lost = match (arrives, after.by_graph) {
+                    (true, _) => SecondLost::Arrival,
+                    (false, true) => SecondLost::Instant,
+                    (false, false) => SecondLost::Motion,
+                };
             }
             let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
             let mut pairs = self.columns_before.iter().zip(&self.columns).enumerate();

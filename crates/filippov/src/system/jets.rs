@@ -118,15 +118,8 @@ impl MotionJets {
     }
 
     pub(super) fn eval(&self, place: &Place<'_>, p: &[f64], out: &mut [f64]) {
-        let &Place { t, x, signs, .. } = place;
-        let program = self.program.program();
-        let Some(equations) = &self.equations else {
-            return program.eval(t, x, signs, p, &[], out);
-        };
-        match equations.inputs(t, x, signs, p) {
-            Some(inputs) => program.eval(t, x, signs, p, &inputs, out),
-            None => out.fill(f64::NAN),
-        }
+        let equations = self.equations.as_ref();
+        MultiplierEquations::eval(equations, self.program.program(), place, p, out);
     }
 }
 

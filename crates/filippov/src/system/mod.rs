@@ -48,6 +48,7 @@ pub(crate) use definition::{check_index, inconsistent};
 pub use definition::{Definition, Rules};
 pub use enclosures::Enclosures;
 pub use jacobian::MotionJacobian;
+pub(crate) use jet_multipliers::{derivative_along, MultiplierEquations};
 pub(crate) use jets::sliding_field;
 pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws, Step};

@@ -12,6 +12,7 @@ use filippov_expr::{
 use smallvec::SmallVec;
 
 use super::compiled::{Follower, Model};
+use super::jet_multipliers::MultiplierEquations;
 use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
@@ -166,9 +167,15 @@ impl TracedSystem {
     }
 
     /// Evaluates the series of a motion at a place.
-    pub(crate) fn eval_series(&self, series: &JetProgram, place: &Place<'_>, out: &mut [f64]) {
+    pub(crate) fn eval_series(
+        &self,
+        series: &JetProgram,
+        equations: Option<&MultiplierEquations>,
+        place: &Place<'_>,
+        out: &mut [f64],
+    ) {
         self.with_values(place.q, |p| {
-            series.eval(place.t, place.x, place.signs, p, &[], out);
+            MultiplierEquations::eval(equations, series, place, p, out);
         });
     }
 
