@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 
 import filippov as fl
@@ -43,3 +44,25 @@ def test_a_steep_function_far_from_zero_is_not_taken_for_zero(method: str) -> No
         x = start[:, None] + velocity[:, None] * middles
         expected = 4.0 * np.mean(np.cbrt(np.abs(x[0] * x[1])) % 0.5)
         assert abs(sol.y[2, -1] - expected) < 1e-4
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_root_ends_where_a_function_of_it_vanishes_that_has_no_sign_beyond(method: str) -> None:
+    """Where x < 0 the remainder is zero: its sign means nothing there, and one mode follows under one name."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", fl.FilippovWarning)
+        warnings.filterwarnings("ignore", "no_series")
+        sol = fl.solve_ivp(
+            lambda t, x: [-0.257, np.cbrt(np.sqrt(np.maximum(x[0], 0.0)) % 0.5)],
+            (0.0, 4.0),
+            [0.785, 0.0],
+            method=method,
+            rtol=1e-8,
+            atol=1e-8,
+        )
+    assert sol.success
+    # The integral over x of the root of sixth order up to 1/4, and beyond of the cube root of sqrt(x) - 1/2.
+    up_to = 6.0 / 7.0 * 0.25 ** (7.0 / 6.0)
+    w = np.sqrt(0.785) - 0.5
+    beyond = 2.0 * (3.0 / 7.0 * w ** (7.0 / 3.0) + 0.5 * 0.75 * w ** (4.0 / 3.0))
+    assert abs(sol.y[1, -1] - (up_to + beyond) / 0.257) < 1e-5

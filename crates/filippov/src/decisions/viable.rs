@@ -177,7 +177,8 @@ fn by_trial(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<Survey, 
     Ok(found)
 }
 
-/// Follows a mode that agrees with its own signs for a moment. Without a field it is no motion.
+/// Follows a mode that agrees with its own signs for a moment. Without a field it is no motion. Signs that do not matter in it
+/// are no guards, and modes that differ only in them are one.
 fn try_candidate(
     at: &Point,
     notes: &mut Notes,
@@ -185,6 +186,21 @@ fn try_candidate(
     (mode, vanishing): (Mode, &[bool]),
     found: &mut Survey,
 ) -> Result<(), FieldError> {
+    let idle: Vec<usize> = meeting
+        .surfaces
+        .iter()
+        .copied()
+        .filter(|&j| !matters(at, j, &mode))
+        .collect();
+    let is_same = |other: &Mode| {
+        let mut pairs = mode.entries().iter().zip(other.entries()).enumerate();
+        pairs.all(|(j, (a, b))| a == b || idle.contains(&j))
+    };
+    let known = found.viable.iter().map(|viable| &viable.next.mode);
+    let slides_on_nothing = mode.sliding_set().any(|j| idle.contains(&j));
+    if slides_on_nothing || known.chain(&found.open).any(is_same) {
+        return Ok(());
+    }
     let velocity = at.velocity(notes, &mode, &[])?;
     let surfaces = meeting.surfaces.iter().copied();
     let mut guards = surfaces
@@ -207,13 +223,24 @@ fn try_candidate(
     }
     let next = Next::new(mode.clone(), Lefts::new());
     let met = surfaces.zip(vanishing).filter(|(_, vanishes)| **vanishes);
-    let met: Vec<usize> = met.map(|(j, _)| j).collect();
+    let met: Vec<usize> = met.map(|(j, _)| j).filter(|j| !idle.contains(j)).collect();
     match try_mode(at, notes, &next, &met, ROUNDING)? {
         Trial::Leaves(left) => found.viable.push(Viable::strictly(Next { left, ..next })),
         Trial::Ends => found.failing.push((mode, guard)),
         Trial::WithinRounding => found.open.push(mode),
     }
     Ok(())
+}
+
+/// Does the field around what the mode slides on depend on the sign of h_j, on either side of it?
+fn matters(at: &Point, j: usize, mode: &Mode) -> bool {
+    let mut active = vec![false; mode.entries().len()];
+    [-1, 1].into_iter().any(|side| {
+        let beside = mode.with(j, side);
+        let sliding: Vec<usize> = beside.sliding_set().collect();
+        at.system.active(&beside.signs(), &sliding, &mut active);
+        active[j]
+    })
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?
