@@ -602,7 +602,10 @@ def test_sliding_to_a_point_where_both_fields_are_tangent_is_named() -> None:
 
 
 def test_derivatives_of_a_black_box_advise_only_what_helps() -> None:
-    system = fl.System(lambda t, x: [{1: 2}.get(x[0], -x[0])], n=1, surfaces=[lambda t, x: x[0] - 0.5])
+    def called(t: float, x: Any) -> list[Any]:
+        return [{1: 2}.get(x[0], -x[0])]
+
+    system = fl.System(called, n=1, surfaces=[lambda t, x: x[0] - 0.5])
     with pytest.raises(fl.InputError, match=r"this one is called: .*key of a dict") as caught:
         system.solve((0, 1), [1.0], wrt="y0")
     assert "surfaces=" not in str(caught.value)

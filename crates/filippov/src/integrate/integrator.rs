@@ -215,7 +215,7 @@ impl<'a> Integrator<'a> {
             }
         }
         let room = (remaining, self.horizon >= self.t_end);
-        let dt = self.control.next(&self.run, room);
+        let dt = self.control.next(&self.run, room)?;
         let shortest = shortest_step(self.run.t);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, lost_guards)?;
@@ -242,7 +242,7 @@ impl<'a> Integrator<'a> {
         match attempt {
             Attempt::NotFinite => {
                 self.run.stats.reject(sliding);
-                self.control.shorten_to_surface(dt, &self.run);
+                self.control.shorten_to_surface(dt, &self.run)?;
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {

@@ -7,9 +7,10 @@ use super::pace::{excursion, Paces};
 use super::stiffness::{Stiff, Stiffness};
 use super::{Controller, Steppers};
 use crate::error::FieldError;
-use crate::motion::{Leading, ModeField, Monitored, Run};
+use crate::motion::{Leading, ModeField, Run};
 use crate::options::Method;
 use crate::status::{Stop, Warning, WarningCode};
+use crate::system::is_zero_within;
 use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, ROUNDING, SMALLEST_GUESS};
 
 /// The control of the step: the proposed length, and what was seen of the steps before.
@@ -174,31 +175,35 @@ impl StepControl {
 
     /// The length of the next step, at most `max_step` of the options and the time that `remains` up to the next known time, which is the end
     /// of the run or not.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
     #[inline(always)]
-    pub fn next(&mut self, at: &Run, (remains, is_end): (f64, bool)) -> f64 {
-        let dt = self.aim_at_surface(self.dt.min(at.options.max_step), at);
+    pub fn next(&mut self, at: &Run, (remains, is_end): (f64, bool)) -> Result<f64, FieldError> {
+        let dt = self.aim_at_surface(self.dt.min(at.options.max_step), at)?;
         self.wanted = 0.0;
         if dt < remains * 0.99 {
-            return dt;
+            return Ok(dt);
         }
         if !is_end {
             self.wanted = dt;
         }
-        remains
+        Ok(remains)
     }
 
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
     /// from the start, close enough for the continuous extension to reach it.
-    fn aim_at_surface(&mut self, dt: f64, at: &Run) -> f64 {
+    #[inline(always)]
+    fn aim_at_surface(&mut self, dt: f64, at: &Run) -> Result<f64, FieldError> {
         if !self.meets_edges || self.one_sided {
-            return dt;
+            return Ok(dt);
         }
-        let nearest = nearest_surface(at);
+        let nearest = nearest_surface(at)?;
         if nearest > dt {
-            return dt;
+            return Ok(dt);
         }
         self.one_sided = true;
-        ONE_SIDED_AIM * nearest
+        Ok(ONE_SIDED_AIM * nearest)
     }
 
     /// After an attempt with an error that is too large.
@@ -208,20 +213,24 @@ impl StepControl {
 
     /// After a step that was not finite: aims at the surface that the motion approaches, or shortens
     /// the step if it did so already.
-    pub fn shorten_to_surface(&mut self, dt: f64, at: &Run) {
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn shorten_to_surface(&mut self, dt: f64, at: &Run) -> Result<(), FieldError> {
         self.controller.not_finite();
         if let ModeField::Intersection(field) = &at.motion.field {
             if field.is_rootless() {
                 // No edge of the field: the multipliers end, or move fast.
                 self.dt = 0.5 * dt;
-                return;
+                return Ok(());
             }
         }
-        let aim = ONE_SIDED_AIM * nearest_surface(at);
+        let aim = ONE_SIDED_AIM * nearest_surface(at)?;
         let aims = !self.one_sided && aim < dt;
         self.dt = if aims { aim } else { 0.5 * dt };
         self.one_sided = true;
         self.meets_edges = true;
+        Ok(())
     }
 
     /// After a step whose events could not be decided.
@@ -356,12 +365,23 @@ pub(crate) fn shortest_step(t: f64) -> f64 {
     (ROUNDING * t.abs()).max(f64::MIN_POSITIVE)
 }
 
-/// Predicted time to the next zero of what is monitored. A prediction below the shortest step is left out: beside a root a
-/// function far from zero has a slope by which it would vanish at once.
-fn nearest_surface(at: &Run) -> f64 {
-    let times = at.motion.monitored.iter().map(Monitored::time_to_zero);
-    let shortest = shortest_step(at.t);
-    times
-        .filter(|time| ONE_SIDED_AIM * time >= shortest)
-        .fold(f64::INFINITY, f64::min)
+/// Predicted time to the next zero of what is monitored. A zero within the shortest step has to be near by its value too:
+/// beside a root the slope of a function far from zero is so large that it would vanish at once.
+fn nearest_surface(at: &Run) -> Result<f64, FieldError> {
+    let (mut nearest, shortest) = (f64::INFINITY, shortest_step(at.t));
+    for m in &at.motion.monitored {
+        let time = m.time_to_zero();
+        if time >= nearest {
+            continue;
+        }
+        if let (Some(j), true) = (m.surface(), ONE_SIDED_AIM * time < shortest) {
+            let place = at.motion.setting().at(at.t, &at.x);
+            let value = (j, m.orientation * m.value);
+            if !is_zero_within(at.system, &place, value, &at.scale)? {
+                continue;
+            }
+        }
+        nearest = time;
+    }
+    Ok(nearest)
 }
