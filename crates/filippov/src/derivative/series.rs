@@ -7,7 +7,7 @@ use crate::system::{
 };
 
 /// The series of a motion of a traced system with those of its changes, in a region or on one surface: of one change, or of two with
-/// the mixed second derivative along them. The latter there are on several surfaces too.
+/// the mixed second derivative along them. Those of two exist on several surfaces too.
 pub(super) struct ChangeSeries {
     program: Tiered<JetProgram>,
     /// Of the multipliers of several surfaces, and of their changes.
@@ -27,7 +27,7 @@ pub(super) struct Coefficients {
 }
 
 impl ChangeSeries {
-    /// Of the motions on these surfaces; `None` if there are several, and one change.
+    /// Of the motions on these surfaces; `None` if there are several surfaces and only one change.
     pub fn new(
         system: &TracedSystem,
         sliding: &[usize],
