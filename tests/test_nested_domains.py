@@ -48,7 +48,7 @@ def test_a_steep_function_far_from_zero_is_not_taken_for_zero(method: str) -> No
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_root_ends_where_a_function_of_it_vanishes_that_has_no_sign_beyond(method: str) -> None:
-    """Where x < 0 the remainder is zero: its sign means nothing there, and one mode follows under one name."""
+    """Where x < 0 the remainder is zero, and its sign means nothing: one mode follows, under one name."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", fl.FilippovWarning)
         warnings.filterwarnings("ignore", "no_series")
