@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 use super::change::Row;
 use super::forms::{Form, MapAt};
-use super::series::ChangeSeries;
+use super::series::{ChangeSeries, Changes};
 use crate::error::{Error, FieldError};
 use crate::record::Gradient;
 use crate::system::{
@@ -48,7 +48,7 @@ pub struct Extension {
 }
 
 /// The series of changes, by the surfaces slid on and the order.
-type SeriesCache = Mutex<FxHashMap<(Surfaces, usize, bool), Option<Arc<ChangeSeries>>>>;
+type SeriesCache = Mutex<FxHashMap<(Surfaces, usize, Changes), Option<Arc<ChangeSeries>>>>;
 type Surfaces = SmallVec<[usize; 2]>;
 
 impl Extension {
@@ -322,16 +322,18 @@ impl Extended<'_> {
         map.second((t, &act.x), &self.values)
     }
 
-    /// The series of the changes of the motions on these surfaces, or of pairs of changes, if they have any.
+    /// The series of these changes of the motions on these surfaces, if they have any.
     pub(super) fn series(
         &self,
         sliding: &[usize],
         order: usize,
-        of_pairs: bool,
+        changes: Changes,
     ) -> Option<Arc<ChangeSeries>> {
         let mut known = self.series.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = known.entry((SmallVec::from_slice(sliding), order, of_pairs));
-        let make = || ChangeSeries::new(&self.system, sliding, order, of_pairs).map(Arc::new);
+        let own = (&self.system, self.n);
+        let make = || ChangeSeries::new(own, sliding, order, &changes).map(Arc::new);
+        let surfaces = SmallVec::from_slice(sliding);
+        let made = known.entry((surfaces, order, changes.clone()));
         made.or_insert_with(make).clone()
     }
 

@@ -10,7 +10,7 @@ use super::collocation::{operations, Collocation};
 use super::extended::Extended;
 use super::forms::{pairs, Second};
 use super::radau::NODES;
-use super::series::{ChangeSeries, Coefficients};
+use super::series::{Carried, ChangeSeries, Changes};
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -102,10 +102,11 @@ pub(super) struct Piece<'a> {
     pub is_affine: bool,
     /// Does its field follow from the graph alone?
     pub by_graph: bool,
-    /// The series of its changes, if it has any.
-    series: Option<Arc<ChangeSeries>>,
-    coefficients: Coefficients,
-    carried: Vec<Vec<f64>>,
+    /// The series of so many changes, if they have any that is cheap.
+    series: Option<(usize, Option<Arc<ChangeSeries>>)>,
+    carried: Carried,
+    /// The columns at the end of a step.
+    at_end: Vec<f64>,
     rtol: f64,
     /// The order of the series.
     order: usize,
@@ -163,14 +164,11 @@ impl<'a> Piece<'a> {
             sides: sides.clone(),
             field,
             jacobian,
-            is_affine: is_affine(&extended.system, &sliding),
+            is_affine: sliding.is_empty() || is_affine(&extended.system, &sliding),
             by_graph,
-            series: match by_graph {
-                true => extended.series(&sliding, around.order, false),
-                false => None,
-            },
-            coefficients: Coefficients::default(),
-            carried: Vec::new(),
+            series: None,
+            carried: Carried::default(),
+            at_end: Vec::new(),
             rtol: around.rtol,
             order: around.order,
             longest: longest_part(around.rtol),
@@ -256,31 +254,53 @@ impl<'a> Piece<'a> {
         (t0, t1): (f64, f64),
         columns: &mut [Vec<f64>],
     ) -> Result<bool, FieldError> {
-        let is_cheap = |series: &&Arc<ChangeSeries>| {
-            let count = columns.len();
-            series.operations() * count <= operations(self.extended.n, count)
-        };
-        let Some(series) = self.series.as_ref().filter(is_cheap) else {
+        let count = columns.len();
+        if self.series.as_ref().is_none_or(|known| known.0 != count) {
+            self.series = Some((count, self.series_of(columns)));
+        }
+        let Some((_, Some(series))) = &self.series else {
             return Ok(false);
         };
         let (n, system) = (self.extended.n, &self.extended.system);
-        self.carried.resize_with(columns.len(), Vec::new);
-        for (carried, column) in self.carried.iter_mut().zip(&*columns) {
-            carried.clone_from(column);
+        let setting = Setting::new(&self.signs, &self.q);
+        self.at_end.clear();
+        for columns in columns.chunks(series.n_changes()) {
+            let changes = columns.iter().map(Vec::as_slice);
+            series.take(&self.point, changes, &mut self.carried);
             let (mut t, mut left) = (t0, t1 - t0);
             while left > 0.0 {
-                path(t, &mut self.point[..n])?;
-                let place = Setting::new(&self.signs, &self.q).at(t, &self.point);
-                let motion = (system, &place);
-                let size = (n, self.rtol, SHORTEST);
-                match series.carry(motion, size, left, carried, &mut self.coefficients) {
+                path(t, &mut self.carried.at[..n])?;
+                let motion = (system, &setting, t);
+                match series.carry(motion, (self.rtol, SHORTEST), left, &mut self.carried) {
                     Some(rest) => (t, left) = (t1 - rest, rest),
                     None => return Ok(false),
                 }
             }
+            for change in series.changes(&self.carried) {
+                self.at_end.extend_from_slice(&change[..n]);
+            }
         }
-        columns.swap_with_slice(&mut self.carried);
+        for (column, end) in columns.iter_mut().zip(self.at_end.chunks_exact(n)) {
+            column[..n].copy_from_slice(end);
+        }
         Ok(true)
+    }
+
+    /// The series of these columns, if they have any that is cheaper than collocation.
+    fn series_of(&self, columns: &[Vec<f64>]) -> Option<Arc<ChangeSeries>> {
+        if !self.by_graph {
+            return None;
+        }
+        let (n, count) = (self.extended.n, columns.len());
+        let series = |changes| self.extended.series(&self.sliding, self.order, changes);
+        let all_at_once = || {
+            let one = series(Changes::of(&columns[..1], n)?)?;
+            let is_small = one.is_unrolled() && one.operations(count) <= operations(n, count);
+            let all = is_small.then(|| series(Changes::of(columns, n)?));
+            all.flatten().filter(|all| all.is_unrolled())
+        };
+        let found = all_at_once().or_else(|| series(Changes::Any));
+        found.filter(|found| found.operations(count) <= operations(n, count))
     }
 
     /// Takes the gradient of a function of the state at the end of a step back to its start, and adds to the shares of the
@@ -310,28 +330,34 @@ impl<'a> Piece<'a> {
     ) -> Result<bool, FieldError> {
         let n = self.extended.n;
         let series = match self.by_graph {
-            true => self.extended.series(&self.sliding, self.order, true),
+            true => self
+                .extended
+                .series(&self.sliding, self.order, Changes::Pair),
             false => None,
         };
         let Some(series) = series else {
             return Ok(false);
         };
         for ((a, b), mixed) in pairs(columns.len()).zip(&mut second.pairs) {
-            let rest = vec![0.0; self.point.len() - n];
-            let mut changes = [&columns[a][..], &columns[b], mixed, &rest].concat();
+            mixed.resize(self.point.len(), 0.0);
+            let changes = [&columns[a][..], &columns[b], mixed];
+            series.take(&self.point, changes, &mut self.carried);
             let (mut t, mut left) = (t0, t1 - t0);
             while left > 0.0 {
                 path(t, &mut self.point[..n])?;
                 self.take_multipliers(t)?;
-                let place = Setting::new(&self.node_signs, &self.q).at(t, &self.point);
-                let size = (n, self.rtol, SHORTEST_OF_PAIRS);
-                let motion = (&self.extended.system, &place);
-                match series.carry(motion, size, left, &mut changes, &mut self.coefficients) {
+                self.carried.at[..n].copy_from_slice(&self.point[..n]);
+                let setting = Setting::new(&self.node_signs, &self.q);
+                let motion = (&self.extended.system, &setting, t);
+                let size = (self.rtol, SHORTEST_OF_PAIRS);
+                match series.carry(motion, size, left, &mut self.carried) {
                     Some(rest) => (t, left) = (t1 - rest, rest),
                     None => return Ok(false),
                 }
             }
-            mixed.copy_from_slice(&changes[2 * self.point.len()..][..n]);
+            mixed.clear();
+            let found = series.changes(&self.carried).last();
+            mixed.extend(found.into_iter().flat_map(|found| &found[..n]));
         }
         Ok(true)
     }

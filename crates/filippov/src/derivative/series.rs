@@ -1,56 +1,106 @@
 //! Taylor series of the change of a motion: of M' = Df M + D_p f along the motion itself.
 
 use filippov_expr::{Backend, Graph, JetProgram, Multipliers, NodeId};
+use smallvec::SmallVec;
 
 use crate::system::{
-    derivative_along, sliding_field, MultiplierEquations, Place, Tiered, TracedSystem,
+    derivative_along, sliding_field, MultiplierEquations, Setting, Tiered, TracedSystem,
 };
 
-/// The series of a motion of a traced system with those of its changes, in a region or on one surface: of one change, or of two with
-/// the mixed second derivative along them. Those of two exist on several surfaces too.
+/// Which changes of a motion have one series.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Changes {
+    /// One change, with its shares of the parameters behind it.
+    Any,
+    /// Two of these, and the mixed second derivative along them.
+    Pair,
+    /// So many at once, without their shares of the parameters: each is by one parameter, or by none.
+    By(SmallVec<[Option<usize>; 4]>),
+}
+
+impl Changes {
+    /// Those of columns of n states with the shares of the parameters behind them; `None` if one has shares of several.
+    pub fn of(columns: &[Vec<f64>], n: usize) -> Option<Self> {
+        let parameter = |column: &Vec<f64>| {
+            let mut shares = column[n..]
+                .iter()
+                .enumerate()
+                .filter(|share| *share.1 != 0.0);
+            match (shares.next(), shares.next()) {
+                (None, _) => Some(None),
+                (Some((p, 1.0)), None) => Some(Some(p)),
+                _ => None,
+            }
+        };
+        columns
+            .iter()
+            .map(parameter)
+            .collect::<Option<_>>()
+            .map(Changes::By)
+    }
+}
+
+/// The series of a motion of a traced system with those of its changes, in a region or on one surface; of pairs of changes on several
+/// surfaces too.
 pub(super) struct ChangeSeries {
     program: Tiered<JetProgram>,
     /// Of the multipliers of several surfaces, and of their changes.
     equations: Option<MultiplierEquations>,
     order: usize,
-    /// How many states the system has, and how many changes of these there are.
+    /// How many states the extended system has.
     size: usize,
+    /// How many changes there are, and how many entries each has.
     n_changes: usize,
+    block: usize,
+    /// How many entries of each are not shares of parameters.
+    n: usize,
 }
 
-/// Room for the coefficients.
+/// A place with changes behind it, and room for their coefficients.
 #[derive(Default)]
-pub(super) struct Coefficients {
+pub(super) struct Carried {
+    pub at: Vec<f64>,
     rows: Vec<f64>,
-    start: Vec<f64>,
-    end: Vec<f64>,
 }
 
 impl ChangeSeries {
-    /// Of the motions on these surfaces; `None` if there are several surfaces and only one change.
+    /// Of the motions on these surfaces, with n states before the parameters; `None` if there are several surfaces and no pair of
+    /// changes.
     pub fn new(
-        system: &TracedSystem,
+        (system, n): (&TracedSystem, usize),
         sliding: &[usize],
         order: usize,
-        of_pairs: bool,
+        kind: &Changes,
     ) -> Option<Self> {
         let mut graph = system.graph().clone();
         let size = system.field_nodes().len();
-        let n_changes = if of_pairs { 3 } else { 1 };
-        let changes: Vec<Vec<NodeId>> = (1..=n_changes)
-            .map(|k| {
-                let states = size * k..size * (k + 1);
-                states.map(|i| graph.state(i as u32)).collect()
-            })
-            .collect();
-        let (mut equations, mut multipliers) = (None, Multipliers::default());
-        let field = match (sliding, &changes[..]) {
-            ([], _) => with_changes(&mut graph, system.field_nodes().to_vec(), &changes),
-            (&[j], _) => {
-                let field = sliding_field(&mut graph, system.field_nodes(), j).0;
-                with_changes(&mut graph, field, &changes)
+        let (n_changes, block) = match kind {
+            Changes::Any => (1, size),
+            Changes::Pair => (3, size),
+            Changes::By(parameters) => (parameters.len(), n),
+        };
+        let (zero, one) = (graph.constant(0.0), graph.constant(1.0));
+        let mut changes = Vec::with_capacity(n_changes);
+        for k in 0..n_changes {
+            let entries = (0..block).map(|i| graph.state((size + block * k + i) as u32));
+            let mut change: Vec<NodeId> = entries.collect();
+            if let Changes::By(parameters) = kind {
+                change.resize(size, zero);
+                parameters[k].into_iter().for_each(|p| change[n + p] = one);
             }
-            (_, [a, b, mixed]) => {
+            changes.push(change);
+        }
+        let (mut equations, mut multipliers) = (None, Multipliers::default());
+        let field = match (sliding, kind, &changes[..]) {
+            ([], ..) => {
+                let field = system.field_nodes().to_vec();
+                with_changes(&mut graph, field, block, (kind, &changes))
+            }
+            (&[j], ..) => {
+                let field = sliding_field(&mut graph, system.field_nodes(), j).0;
+                with_changes(&mut graph, field, block, (kind, &changes))
+            }
+            (_, Changes::Pair, [a, b, mixed]) => {
                 let (field, backend) = (system.field_nodes(), Backend::Native);
                 let changes = [a.clone(), b.clone(), mixed.clone()];
                 let made = MultiplierEquations::with_changes(
@@ -68,57 +118,85 @@ impl ChangeSeries {
             order,
             size,
             n_changes,
+            block,
+            n,
         })
     }
 
-    /// How many operations it takes to carry a change.
-    pub fn operations(&self) -> usize {
-        self.program.program().operations()
+    /// How many operations it takes to carry so many changes.
+    pub fn operations(&self, count: usize) -> usize {
+        self.program.program().operations() * count.div_ceil(self.n_changes)
     }
 
-    /// Carries changes, one behind the other, with n components that are not parameters, over a time `dt` from a place, as far as
-    /// the series allows and at least over `least` of it; returns the time that is left, `None` if the series is too short.
+    /// Is its program unrolled?
+    pub fn is_unrolled(&self) -> bool {
+        self.program.program().is_unrolled()
+    }
+
+    /// How many changes are carried at once.
+    pub fn n_changes(&self) -> usize {
+        self.n_changes
+    }
+
+    /// Takes these changes behind a place.
+    pub fn take<'c>(
+        &self,
+        point: &[f64],
+        changes: impl IntoIterator<Item = &'c [f64]>,
+        carried: &mut Carried,
+    ) {
+        carried.at.clear();
+        carried.at.extend_from_slice(point);
+        for change in changes {
+            carried.at.extend_from_slice(&change[..self.block]);
+        }
+    }
+
+    /// The changes that are carried.
+    pub fn changes<'c>(&self, carried: &'c Carried) -> impl Iterator<Item = &'c [f64]> {
+        carried.at[self.size..].chunks_exact(self.block)
+    }
+
+    /// Carries changes over a time `dt` from a place, as far as the series allows and at least over `least` of it; returns the time
+    /// that is left, `None` if the series is too short.
     pub fn carry(
         &self,
-        (system, place): (&TracedSystem, &Place),
-        (n, rtol, least): (usize, f64, f64),
+        (system, setting, t): (&TracedSystem, &Setting, f64),
+        (rtol, least): (f64, f64),
         dt: f64,
-        changes: &mut [f64],
-        room: &mut Coefficients,
+        carried: &mut Carried,
     ) -> Option<f64> {
-        let width = (1 + self.n_changes) * self.size;
-        room.rows.resize((self.order + 1) * width, 0.0);
-        room.start.clear();
-        room.start.extend_from_slice(place.x);
-        room.start.extend_from_slice(changes);
-        let at = Place {
-            x: &room.start,
-            ..*place
-        };
-        let equations = self.equations.as_ref();
-        system.eval_series(self.program.program(), equations, &at, &mut room.rows);
-        if !room.rows[self.order * width..]
-            .iter()
-            .all(|c| c.is_finite())
-        {
+        let (order, width) = (self.order, self.size + self.n_changes * self.block);
+        let Carried { at, rows } = carried;
+        rows.resize((order + 1) * width, 0.0);
+        let (program, equations) = (self.program.program(), self.equations.as_ref());
+        system.eval_series(program, equations, &setting.at(t, at), rows);
+        let rows = &rows[..(order + 1) * width];
+        if !rows[order * width..].iter().all(|c| c.is_finite()) {
             return None;
         }
         // The two last terms are to be below the tolerance.
+        let below = dt.powi(order as i32 - 1);
+        let powers = [(order - 1, below), (order, below * dt)];
         let mut share = 1.0_f64;
         for block in 0..self.n_changes {
-            let own = block * self.size..block * self.size + n;
-            // Not the size at the end: a series that is too long for a fast motion has an end beyond all bounds.
-            let term = |k: usize| {
-                let row = &room.rows[k * width + self.size..][own.clone()];
-                largest(row) * dt.powi(k as i32)
+            let first = self.size + block * self.block;
+            let largest = |k: usize| {
+                let row = &rows[k * width + first..][..self.n];
+                row.iter().fold(0.0_f64, |most, c| c.abs().max(most))
             };
-            let size = (0..=self.order).map(term).find(|size| *size > 0.0);
-            let bound = 0.5 * rtol * size.unwrap_or(0.0);
+            // Not the size at the end: a series that is too long for a fast motion has an end beyond all bounds.
+            let mut size = largest(0);
+            if size == 0.0 {
+                let terms = (1..=order).map(|k| largest(k) * dt.powi(k as i32));
+                size = terms.into_iter().find(|size| *size > 0.0).unwrap_or(0.0);
+            }
+            let bound = 0.5 * rtol * size;
             if !bound.is_finite() {
                 return None;
             }
-            for k in [self.order - 1, self.order] {
-                let term = term(k);
+            for (k, power) in powers {
+                let term = largest(k) * power;
                 if term > bound {
                     share = share.min((bound / term).powf(1.0 / k as f64));
                 }
@@ -128,38 +206,30 @@ impl ChangeSeries {
             return None;
         }
         let step = share * dt;
-        room.end.resize(changes.len(), 0.0);
-        self.sum(&room.rows, step, &mut room.end);
-        changes.copy_from_slice(&room.end);
+        for (i, entry) in at.iter_mut().enumerate().skip(self.size) {
+            let coefficients = (0..=order).rev().map(|k| rows[k * width + i]);
+            *entry = coefficients.fold(0.0, |sum, c| sum * step + c);
+        }
         Some(dt - step)
     }
-
-    /// The changes after this time.
-    fn sum(&self, rows: &[f64], dt: f64, out: &mut [f64]) {
-        out.fill(0.0);
-        let width = (1 + self.n_changes) * self.size;
-        for row in rows.chunks_exact(width).rev() {
-            for (entry, c) in out.iter_mut().zip(&row[self.size..]) {
-                *entry = *entry * dt + c;
-            }
-        }
-    }
 }
 
-fn largest(entries: &[f64]) -> f64 {
-    entries.iter().fold(0.0, |most, c| c.abs().max(most))
-}
-
-/// A field with the rates of changes behind it: of one, or of two and of the mixed one of both.
-fn with_changes(graph: &mut Graph, field: Vec<NodeId>, changes: &[Vec<NodeId>]) -> Vec<NodeId> {
+/// A field with the rates of changes behind it, so many of each; with those of the mixed one behind a pair.
+fn with_changes(
+    graph: &mut Graph,
+    field: Vec<NodeId>,
+    block: usize,
+    (kind, changes): (&Changes, &[Vec<NodeId>]),
+) -> Vec<NodeId> {
     let mut along = |values: &[NodeId], change: &[NodeId]| -> Vec<NodeId> {
         let rates = values.iter();
         rates
             .map(|&rate| derivative_along(graph, rate, change))
             .collect()
     };
-    let mut rates: Vec<Vec<NodeId>> = changes.iter().map(|own| along(&field, own)).collect();
-    if let [first, _, mixed] = &mut rates[..] {
+    let own = changes.iter().map(|change| along(&field[..block], change));
+    let mut rates: Vec<Vec<NodeId>> = own.collect();
+    if let (Changes::Pair, [first, _, mixed]) = (kind, &mut rates[..]) {
         let bends = along(first, &changes[1]);
         for (rate, bend) in mixed.iter_mut().zip(bends) {
             *rate = graph.add(*rate, bend);
