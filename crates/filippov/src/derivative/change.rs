@@ -74,6 +74,16 @@ impl Change {
     }
 
     fn apply_once(&self, n: usize, column: &mut [f64]) {
+        // Mostly there is one direction, and no map.
+        if let (None, [row], [direction]) = (&self.map, &self.rows[..], &self.directions[..]) {
+            let share = match self.equations {
+                Equations::One(product) => dot(row, column) / product,
+                _ => dot(row, column),
+            };
+            let entries = column.iter_mut().zip(direction);
+            entries.for_each(|(entry, d)| *entry += share * d);
+            return;
+        }
         let mut shares: Vector = self.rows.iter().map(|row| dot(row, column)).collect();
         match &self.equations {
             Equations::None => {}
@@ -124,7 +134,7 @@ impl Change {
 /// of the parameters.
 pub(super) fn matrices(changes: &[Change], (n, m): (usize, usize)) -> (Vec<f64>, Vec<f64>) {
     let (mut by_states, mut by_parameters) = (vec![0.0; n * n], vec![0.0; n * m]);
-    let mut unit = vec![0.0; n + m];
+    let mut unit = Row::from_elem(0.0, n + m);
     for i in 0..n + m {
         unit.fill(0.0);
         unit[i] = 1.0;

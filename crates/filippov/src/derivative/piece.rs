@@ -255,6 +255,9 @@ impl<'a> Piece<'a> {
         columns: &mut [Vec<f64>],
     ) -> Result<bool, FieldError> {
         let count = columns.len();
+        if count == 0 {
+            return Ok(true);
+        }
         if self.series.as_ref().is_none_or(|known| known.0 != count) {
             self.series = Some((count, self.series_of(columns)));
         }

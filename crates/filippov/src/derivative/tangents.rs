@@ -307,8 +307,10 @@ impl<'a> Tangents<'a> {
                 }
             }
             piece.advance(along, (t0, t1), &mut self.columns)?;
-            let z = extended.state(&extended.with_named(x_end, step.discrete));
-            piece.project(t1, &z, &mut self.columns)?;
+            if piece.codimension() > 0 {
+                let z = extended.state(&extended.with_named(x_end, step.discrete));
+                piece.project(t1, &z, &mut self.columns)?;
+            }
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
