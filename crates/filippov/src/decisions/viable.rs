@@ -11,6 +11,7 @@ use super::trial::{try_mode, Trial};
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
 use crate::motion::{normal_component, Guard};
+use crate::system::surfaces_that_matter;
 use crate::tolerances::{MOST_MEETING, ROUNDING};
 
 /// All modes at a point.
@@ -190,7 +191,7 @@ fn try_candidate(
         .surfaces
         .iter()
         .copied()
-        .filter(|&j| !matters(at, j, &mode))
+        .filter(|&j| surfaces_that_matter(at.system, &mode, vec![j]).is_empty())
         .collect();
     let is_same = |other: &Mode| {
         let mut pairs = mode.entries().iter().zip(other.entries()).enumerate();
@@ -230,17 +231,6 @@ fn try_candidate(
         Trial::WithinRounding => found.open.push(mode),
     }
     Ok(())
-}
-
-/// Does the field around what the mode slides on depend on the sign of h_j, on either side of it?
-fn matters(at: &Point, j: usize, mode: &Mode) -> bool {
-    let mut active = vec![false; mode.entries().len()];
-    [-1, 1].into_iter().any(|side| {
-        let beside = mode.with(j, side);
-        let sliding: Vec<usize> = beside.sliding_set().collect();
-        at.system.active(&beside.signs(), &sliding, &mut active);
-        active[j]
-    })
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?

@@ -44,7 +44,7 @@ impl Changes {
 /// surfaces too.
 pub(super) struct ChangeSeries {
     program: Tiered<JetProgram>,
-    /// Of the multipliers of several surfaces, and of their changes.
+    /// The equations of the multipliers of several surfaces, and of their changes.
     equations: Option<MultiplierEquations>,
     order: usize,
     /// How many states the extended system has.

@@ -328,6 +328,10 @@ impl<'a> Tangents<'a> {
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
+        let is_accumulation = record.t[0] != record.t[1];
+        if is_accumulation {
+            self.drop_second(SecondLost::Accumulation);
+        }
         let mut instant = Instant {
             around: &self.around,
             extended: self.around.extended,
@@ -336,10 +340,7 @@ impl<'a> Tangents<'a> {
             after: &mut after,
         };
         let had_second = self.second.is_some();
-        if record.t[0] != record.t[1] {
-            if self.second.take().is_some() {
-                self.second_lost = SecondLost::Accumulation;
-            }
+        if is_accumulation {
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {

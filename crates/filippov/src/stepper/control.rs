@@ -173,8 +173,8 @@ impl StepControl {
         Ok(None)
     }
 
-    /// The length of the next step, at most `max_step` of the options and the time that `remains` up to the next known time, which is the end
-    /// of the run or not.
+    /// The length of the next step: at most `max_step`, and at most the time that `remains` up to the next known time, which is
+    /// the end of the run or not.
     ///
     /// # Errors
     /// If a function of the user raises.

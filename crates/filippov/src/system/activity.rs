@@ -4,7 +4,7 @@ use super::PiecewiseSystem;
 use crate::mode::Mode;
 use crate::tolerances::MOST_MEETING;
 
-/// Those of the vanishing surfaces that the field depends on, on some of their sides.
+/// Those of the vanishing surfaces that the field of the mode depends on, on some of their sides.
 pub(crate) fn surfaces_that_matter(
     system: &dyn PiecewiseSystem,
     mode: &Mode,
@@ -29,7 +29,8 @@ pub(crate) fn surfaces_that_matter(
             };
             tried.set(j, if up { 1 } else { -1 });
         }
-        system.active(&tried.signs(), &[], &mut active);
+        let sliding: Vec<usize> = tried.sliding_set().collect();
+        system.active(&tried.signs(), &sliding, &mut active);
         matters.iter_mut().zip(&active).for_each(|(m, a)| *m |= a);
     }
     zeros.into_iter().filter(|&j| matters[j]).collect()

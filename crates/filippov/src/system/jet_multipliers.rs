@@ -40,8 +40,8 @@ impl MultiplierEquations {
         Some((own, sliding, multipliers))
     }
 
-    /// The same with changes of the motion: of the first and the second by the states given, and the mixed one of both by the third. The
-    /// field has the rates of these behind its own.
+    /// The same with two changes of the motion and the mixed one of both, whose states are given. The field has their rates behind
+    /// its own.
     pub fn with_changes(
         graph: &mut Graph,
         field: &[NodeId],

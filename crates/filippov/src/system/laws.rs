@@ -306,7 +306,7 @@ impl Laws {
         }
     }
 
-    /// Has any?
+    /// Does any discrete state start so?
     pub(crate) fn have_thresholds(&self) -> bool {
         (0..self.laws.len()).any(|law| self.has_thresholds(law))
     }
