@@ -211,3 +211,15 @@ def test_signs_that_change_together_do_so_at_one_time(method: str) -> None:
     for start in np.linspace(0.0, 1.0, 12):
         sol = fl.solve_ivp(lambda t, x: [1.0], (0, 4), [start], method=method, events=event)
         assert sol.t_events[0].tolist() == []
+
+
+@pytest.mark.parametrize("method", ["Taylor", "DOPRI5", "DOP853"])
+def test_a_floor_of_a_floor_is_followed_beside_one_of_a_kink(method: str) -> None:
+    """The run follows the inner floor, and not that of the kink, which the event finds first."""
+
+    def event(t: float, x: Any) -> Any:
+        return 0.1 * np.rint(2 * np.abs(x[0] - 2.2)) + np.floor(0.5 * np.rint(2 * np.sin(2 * x[0]))) + 0.85
+
+    sol = fl.solve_ivp(lambda t, x: [1.0], (0, 4), [0.2], method=method, events=event)
+    expected = np.array([0.5 * (np.pi + np.arcsin(0.25)), 2.95]) - 0.2
+    np.testing.assert_allclose(sol.t_events[0], expected, rtol=0, atol=1e-9)

@@ -180,3 +180,23 @@ def test_a_layer_of_a_root_has_no_time_that_is_not_a_number(start: float) -> Non
     assert sol.success, sol.message
     assert np.isfinite(sol.t).all()
     assert sol.y[1, -1] == pytest.approx(0.02 if start > 0 else 0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+def test_a_root_of_a_root_is_compared_with_what_changes_its_sign(method: Any) -> None:
+    """sqrt(abs(cbrt(x))) = x - 0.2: at x = c**6 with c = c**6 - 0.2, and nowhere where x - 0.2 is negative."""
+
+    def gap(x: Any) -> Any:
+        return np.sqrt(np.abs(np.cbrt(x))) - (x - 0.2)
+
+    root = max(r.real for r in np.roots([1, 0, 0, 0, 0, -1, -0.2]) if abs(r.imag) < 1e-12) ** 6
+    sol = fl.solve_ivp(
+        lambda t, x: [1.0, np.where(gap(x[0]) > 0, 1.0, 3.0)],
+        (0, 3),
+        [-1.0, 0.0],
+        method=method,
+        events=lambda t, x: gap(x[0]),
+    )
+    assert sol.success, sol.message
+    np.testing.assert_allclose(sol.t_events[0], [1.0 + root], rtol=0, atol=1e-9)
+    assert sol.y[1, -1] == pytest.approx(1.0 + root + 3.0 * (2.0 - root), abs=1e-8)

@@ -6,7 +6,7 @@
 //! | term | beside c | compared instead |
 //! |---|---|---|
 //! | `cbrt(u)` | anything | u and c^3 |
-//! | `sqrt(u)` | a number, what no motion changes, or of known sign | u and c \|c\| |
+//! | `sqrt(u)` | a number, what no motion changes, or of known sign; anything, if u has a kink | u and c \|c\| |
 //! | `u**p` | the same | u and the power 1/p of \|c\|, with the sign of c |
 //! | `log(u)` | the same | u and exp(c) |
 //!
@@ -156,7 +156,10 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
             Some(power) => power,
             // A power above 1 is smooth enough, and its inverse a root.
             None if p < 1.0 && graph.facts(sum).varies => return None,
-            None => odd_power(graph, &rest, sum, p)?,
+            None => {
+                let has_kink = graph.facts(term.argument).has_sign;
+                odd_power(graph, &rest, sum, p, has_kink)?
+            }
         },
         Inverse::Exponential(base) => {
             if graph.facts(sum).has_sign {
@@ -210,34 +213,44 @@ fn power_of_root(graph: &mut Graph, form: &LinearForm, p: f64) -> Option<NodeId>
     })
 }
 
-/// |c|^p with the sign of c; `None` if that may have a kink along a motion.
-fn odd_power(graph: &mut Graph, form: &LinearForm, c: NodeId, p: f64) -> Option<NodeId> {
+/// |c|^p with the sign of c; `None` if that may have a kink along a motion, unless kinks are made surfaces.
+fn odd_power(
+    graph: &mut Graph,
+    form: &LinearForm,
+    c: NodeId,
+    p: f64,
+    has_kinks: bool,
+) -> Option<NodeId> {
     if let Some(value) = graph.as_constant(c) {
         return Some(graph.constant(value.abs().powf(p).copysign(value)));
     }
-    if !graph.facts(c).varies {
-        // No motion changes it, and so it needs no surface for its sign.
-        if p <= 1.0 {
-            return None;
-        }
-        let (zero, exponent) = (graph.constant(0.0), graph.constant(p - 1.0));
-        let magnitude = graph.binary(BinaryOp::Hypot, c, zero);
-        let power = graph.pow(magnitude, exponent);
-        return Some(graph.mul(c, power));
-    }
-    let power = |graph: &mut Graph, base: NodeId| {
+    let power = |graph: &mut Graph, base: NodeId, p: f64| {
         let p = graph.constant(p);
         graph.pow(base, p)
     };
-    match graph.known_sign(form)? {
-        Switching::Constant(1.0) => Some(power(graph, c)),
-        Switching::Constant(-1.0) => {
+    match graph.known_sign(form) {
+        Some(Switching::Constant(1.0)) => return Some(power(graph, c, p)),
+        Some(Switching::Constant(-1.0)) => {
             let opposite = graph.neg(c);
-            let power = power(graph, opposite);
-            Some(graph.neg(power))
+            let power = power(graph, opposite, p);
+            return Some(graph.neg(power));
         }
-        _ => None,
+        _ => {}
     }
+    // No motion changes it, and so it needs no surface for its sign.
+    let is_fixed = !graph.facts(c).varies;
+    if p <= 1.0 || !is_fixed && !has_kinks {
+        return None;
+    }
+    let magnitude = match is_fixed {
+        true => {
+            let zero = graph.constant(0.0);
+            graph.binary(BinaryOp::Hypot, c, zero)
+        }
+        false => graph.abs(c),
+    };
+    let power = power(graph, magnitude, p - 1.0);
+    Some(graph.mul(c, power))
 }
 
 #[cfg(test)]

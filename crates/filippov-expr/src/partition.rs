@@ -102,8 +102,14 @@ impl Graph {
         image.get(&root).copied().unwrap_or(root)
     }
 
-    /// An expression of another graph, made again here; `None` if it contains signs.
-    pub fn adopted(&mut self, from: &Graph, root: NodeId) -> Option<NodeId> {
+    /// An expression of another graph, made again here, with the numbers that its parameters have here; `None` if it contains
+    /// signs, or a parameter that is not known here.
+    pub fn adopted(
+        &mut self,
+        from: &Graph,
+        root: NodeId,
+        parameters: &[Option<u32>],
+    ) -> Option<NodeId> {
         if from.has_signs(root) {
             return None;
         }
@@ -113,6 +119,10 @@ impl Graph {
                 Node::Constant(value) => self.constant(value),
                 Node::Unary(op, a) => self.unary(op, image[&a]),
                 Node::Binary(op, a, b) => self.binary(op, image[&a], image[&b]),
+                Node::Parameter(k) => {
+                    let own = parameters.get(k as usize).copied().flatten()?;
+                    self.parameter(own)
+                }
                 leaf => self.insert(leaf),
             };
             image.insert(id, made);

@@ -222,11 +222,18 @@ impl Builder {
         Ok(graph.substituted(a, &images).0)
     }
 
-    /// An expression of another builder, made again here; none if it contains signs.
-    fn adopted(&self, other: &Builder, a: u32) -> PyResult<Option<u32>> {
+    /// An expression of another builder, made again here, with the numbers that its parameters have here; none if it contains
+    /// signs, or a parameter without a number.
+    fn adopted(
+        &self,
+        other: &Builder,
+        a: u32,
+        parameters: Vec<Option<u32>>,
+    ) -> PyResult<Option<u32>> {
         let from = other.graph().clone();
         let a = Self::node(&from, a)?;
-        Ok(self.graph().adopted(&from, a).map(|id| id.0))
+        let made = self.graph().adopted(&from, a, &parameters);
+        Ok(made.map(|id| id.0))
     }
 
     /// Those of some expressions that others are made of.

@@ -109,16 +109,23 @@ class Laws:
         return new
 
     def adopt(self, tracer: Tracer, other: Tracer) -> None:
-        """Add the laws that a function beside the field found with a copy of these; keep those it reads."""
+        """Add the laws that a function beside the field found with a copy of these; keep those it reads.
+
+        Those of what has signs, and those that read them, are left to the function itself.
+        """
         found = other.laws
-        for index in range(len(self._laws), len(found._laws)):
-            law = found._laws[index]
-            nodes = [tracer.builder.adopted(other.builder, node) for node in law.nodes]
-            if any(node is None for node in nodes):
-                break  # those behind it may read it
+        places: list[int | None] = list(range(self.first + len(self._laws)))
+        for law, name in zip(found._laws[len(self._laws) :], found.names[len(self._laws) :], strict=True):
+            nodes = [tracer.builder.adopted(other.builder, node, places) for node in law.nodes]
             kept = tuple(node for node in nodes if node is not None)
-            self._state(tracer, law._replace(nodes=kept), found.names[index])
-        self.kept |= {index for index in other.laws_read if index < len(self._laws)}
+            if len(kept) < len(nodes):
+                places.append(None)
+                continue
+            own = law._replace(nodes=kept)
+            self._state(tracer, own, name)
+            places.append(self.first + self._known[own])
+        read = (places[self.first + index] for index in other.laws_read)
+        self.kept |= {place - self.first for place in read if place is not None}
 
     def name(self, tracer: Tracer, name: str, initial: int) -> None:
         """Add a discrete state that begins as an expression and that resets set; before all other laws."""

@@ -92,6 +92,24 @@ fn roots_that_may_end_and_powers_beside_powers_are_left() {
 }
 
 #[test]
+fn a_root_of_a_kink_beside_what_varies_switches_as_a_square() {
+    let mut g = Graph::new();
+    let (x, y) = (g.state(0), g.state(1));
+    let size = g.abs(x);
+    let sqrt = root(&mut g, UnaryOp::Sqrt, size);
+    let beside = g.sub(sqrt, y);
+    assert_eq!(surface(&mut g, beside).0, "abs(x[0]) - sign(x[1])*x[1]**2");
+    // A root without a kink keeps what has none.
+    let squares = {
+        let (xx, yy) = (g.mul(x, x), g.mul(y, y));
+        g.add(xx, yy)
+    };
+    let sqrt = root(&mut g, UnaryOp::Sqrt, squares);
+    let beside = g.sub(sqrt, y);
+    assert!(surface(&mut g, beside).0.contains("sqrt"));
+}
+
+#[test]
 fn a_difference_that_vanishes_where_its_surface_does_is_no_jump() {
     let mut g = Graph::new();
     let (x, one) = (g.state(0), g.constant(1.0));
