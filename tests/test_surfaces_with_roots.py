@@ -184,7 +184,7 @@ def test_a_layer_of_a_root_has_no_time_that_is_not_a_number(start: float) -> Non
 
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
 def test_a_root_of_a_root_is_compared_with_what_changes_its_sign(method: Any) -> None:
-    """sqrt(abs(cbrt(x))) = x - 0.2: at x = c**6 with c = c**6 - 0.2, and nowhere where x - 0.2 is negative."""
+    """sqrt(abs(cbrt(x))) = x - 0.2 at x = c**6 with c = c**6 - 0.2, and nowhere where x - 0.2 is negative."""
 
     def gap(x: Any) -> Any:
         return np.sqrt(np.abs(np.cbrt(x))) - (x - 0.2)
