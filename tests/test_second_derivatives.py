@@ -52,11 +52,13 @@ def by_differences(run: Any, start: Any, params: dict[str, float], d: float) -> 
     return np.moveaxis(np.array(found), 0, -1)
 
 
-def check(system: fl.System, span: tuple[float, float], start: Any, tolerance: float = 1e-6) -> None:
+def check(
+    system: fl.System, span: tuple[float, float], start: Any, tolerance: float = 1e-6, **options: Any
+) -> None:
     params = dict(system.params)
 
     def run(start: Any, values: dict[str, float], order: int = 1) -> fl.Solution:
-        return system.solve(span, start, values, wrt="all", order=order, **TIGHT)
+        return system.solve(span, start, values, wrt="all", order=order, **TIGHT, **options)
 
     sol = run(start, params, 2)
     expected = by_differences(run, start, params, 1e-5)
@@ -208,17 +210,118 @@ def test_two_masses_that_stick_and_slip() -> None:
 
 def test_where_second_derivatives_end_is_named() -> None:
     def two(t: float, x: Any) -> list[Any]:
-        return [0.5 - np.sign(x[0]), 0.2 + 0.1 * np.sign(x[0]) - np.sign(x[1]), np.sign(x[0]) * x[2]]
+        return [-np.sign(x[0]) - 0.3, -np.sign(x[1]) - 0.2, x[0] * x[2]]
 
-    with pytest.warns(fl.FilippovWarning, match=r"second derivatives are not known .*: the run starts on a"):
-        sol = fl.System(two, n=3).solve((0, 3), [0.0, 0.2, 1.0], wrt="y0", order=2)
+    with pytest.warns(fl.FilippovWarning, match=r"second derivatives are not known from t = 0.3.*: several"):
+        sol = fl.System(two, n=3).solve((0, 1), [0.39, 0.36, 1.0], wrt="y0", order=2)
     assert np.isfinite(sol.derivative()).all()
     assert np.isnan(sol.derivative(order=2)).all()
-    floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], direction="down")
-    body = fl.System(lambda t, x: [x[1], -2 * np.cos(2 * t)], n=2, resets=floor)
-    with pytest.warns(fl.FilippovWarning, match=r"second derivatives are not known .* not in contact"):
-        sol = body.solve((0, 0.6), [0.1, 0.0], wrt="y0", order=2)
-    assert np.isfinite(sol.derivative()).all()
+    assert np.isfinite(sol.derivative(0.2, order=2)).all()
+
+
+def test_a_start_that_sticks() -> None:
+    """The velocity comes back to zero by the force of its side; all other columns stay on the surface."""
+
+    def block(t: float, x: Any, F: float = 0.4, w: float = 0.7) -> list[Any]:
+        return [x[1], -x[0] + np.sin(w * t) - F * np.sign(x[1])]
+
+    system = fl.System(block, n=2)
+
+    def run(start: Any, values: dict[str, float]) -> fl.Solution:
+        return system.solve((0, 4), start, values, wrt="all", **TIGHT)
+
+    start = [0.05, 0.0]
+    with pytest.warns(
+        fl.FilippovWarning, match=r"some second derivatives are not known from t = 0 on: the run"
+    ):
+        found = system.solve((0, 4), start, wrt="all", order=2, **TIGHT).derivative(order=2)
+    stays = np.ix_([0, 1], [0, 2, 3], [0, 2, 3])
+    expected = by_differences(run, start, dict(system.params), 1e-5)
+    np.testing.assert_allclose(found[stays], expected[stays], atol=1e-7)
+    assert np.isnan(found[:, 1]).all()
+    assert np.isnan(found[:, :, 1]).all()
+    params = system.solve((0, 4), start, wrt=["F", "w"], order=2, **TIGHT)
+    assert not params.warnings
+    np.testing.assert_array_equal(params.derivative(order=2), found[:, 2:, 2:])
+
+
+def test_an_action_that_puts_the_state_on_a_surface_slid_on() -> None:
+    """What stays on the surface goes on, and what the action puts beside it has no second derivative."""
+    catch = fl.Reset(times=[0.5], map=lambda t, x, a: [x[0] + a * x[2] ** 2, 0.0 * x[1], x[2]])
+
+    def fun(t: float, x: Any, a: float = 0.3) -> list[Any]:
+        return [x[2] + 0.2 * np.sign(x[1]) * x[0] ** 2, -2 * np.sign(x[1]) + x[0], -0.3 * x[0] ** 2 + 0 * a]
+
+    check(fl.System(fun, n=3, resets=catch), (0.0, 1.0), [0.2, 3.0, 0.4], 1e-7)
+    beside = fl.Reset(times=[0.5], map=lambda t, x, a: [x[0], a * (x[0] - x[0] + 1.0) - a, x[2]])
+    system = fl.System(fun, n=3, resets=beside)
+    check(system, (0.0, 1.0), [0.2, 3.0, 0.4], 1e-7)
+    moved = fl.Reset(times=[0.5], map=lambda t, x, a: [x[0], a - 0.3, x[2]])
+    with pytest.warns(
+        fl.FilippovWarning, match="some second derivatives are not known from t = 0.5 on: an ac"
+    ):
+        sol = fl.System(fun, n=3, resets=moved).solve((0, 1), [0.2, 3.0, 0.4], wrt=["y0", "a"], order=2)
+    found = sol.derivative(order=2)
+    assert np.isnan(found[:, 3]).all()
+    assert np.isfinite(found[:, :3, :3]).all()
+
+
+def test_a_break_away_from_static_friction() -> None:
+    def block(t: float, x: Any, k: float = 1.0, s: float = 1.2, belt: float = 0.2) -> list[Any]:
+        return [x[1], -x[0] - k * fl.stick(x[1] - belt, s)]
+
+    system = fl.System(block, n=2)
+    sol = system.solve((0, 20), [0.0, 0.6], wrt="all", order=2, **TIGHT)
+    assert [switch.kind for switch in sol.switches][:2] == ["enter_sliding", "exit_sliding"]
+    check(system, (0.0, 20.0), [0.0, 0.6], 1e-7)
+    # The block is carried from x1 to x = s k: t2 = t1 + (s k - x1) / belt is bilinear in s and k.
+    second = sol.switches[1].derivative.second_dt - sol.switches[0].derivative.second_dt
+    assert second[sol.wrt.index("s"), sol.wrt.index("s")] == pytest.approx(0.0, abs=1e-7)
+    assert second[sol.wrt.index("s"), sol.wrt.index("k")] == pytest.approx(1.0 / 0.2, rel=1e-7)
+
+
+def test_a_body_that_lands_without_a_rebound_and_lifts_off() -> None:
+    floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0, x[2], x[3]], direction="down")
+
+    def fun(t: float, x: Any, a: float = 1.5, w: float = 2.0, k: float = 1.0) -> list[Any]:
+        lift = a * np.sin(w * t) * np.cos(x[2]) + 0.2 * x[3] ** 2
+        return [x[1], -1 - 0.3 * x[1] + lift, x[3], -k * np.sin(x[2]) - 0.2 * x[1]]
+
+    system = fl.System(fun, n=4, resets=floor)
+    start = [0.3, 0.0, 0.7, 0.1]
+    kinds = [switch.kind for switch in system.solve((0, 4.5), start).switches]
+    assert kinds == ["reset", "exit_sliding"]
+    check(system, (0.0, 4.5), start, 1e-7)
+
+
+def test_infinitely_many_impacts() -> None:
+    """A ball from the height h rests at t = sqrt(2 h / g) (1 + r) / (1 - r); its height moves an angle."""
+    floor = fl.Reset(lambda t, x: x[0], lambda t, x, r: [x[0], -r * x[1], x[2]], direction="down")
+
+    def fun(t: float, x: Any, r: float = 0.5, g: float = 9.81) -> list[Any]:
+        return [x[1], -g + 0 * r, np.cos(x[2]) + x[0]]
+
+    system = fl.System(fun, n=3, resets=floor)
+    start = [1.0, 0.0, 0.1]
+    check(system, (0.0, 3.0), start, 1e-7)
+    sol = system.solve((0, 3), start, wrt=["y0", "r", "g"], order=2, **TIGHT)
+    found = sol.switches[-1].derivative.second_dt
+    of_h, of_r = sol.wrt.index("x[0]"), sol.wrt.index("r")
+    size = np.sqrt(2 / 9.81)
+    np.testing.assert_allclose(found[of_h, of_h], -0.25 * size * 3, rtol=1e-7)
+    np.testing.assert_allclose(found[of_h, of_r], 0.5 * size * 2 / 0.5**2, rtol=1e-7)
+    np.testing.assert_allclose(found[of_r, of_r], size * 4 / 0.5**3, rtol=1e-7)
+
+
+def test_sliding_by_another_rule() -> None:
+    def fun(t: float, x: Any, a: float = 0.3) -> list[Any]:
+        u, v = np.sign(x[0]), np.sign(x[1] - a * x[2])
+        return [-2 * u + 0.3 * v + 0.1 * u * v, -2 * v + 0.2 * x[2] - 0.1 * u, 1 + 0.2 * u * v * x[2]]
+
+    system = fl.System(fun, n=3)
+    start = [0.3, 0.5, 0.1]
+    assert itinerary(system.solve((0, 0.8), start, sliding="moments"))[-1] == "00"
+    check(system, (0.0, 0.8), start, sliding="moments")
 
 
 def test_clocks_whose_periods_are_parameters() -> None:

@@ -354,3 +354,26 @@ def test_rules_are_refused_for_more_surfaces_than_they_are_made_for(
     sol = fl.solve_ivp(field, (0, 1), np.zeros(m), sliding=sliding)
     assert not sol.success
     assert reason in sol.message
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_derivatives_by_a_parameter_that_moves_a_surface(rule: str) -> None:
+    """Normals have no component along a parameter: the rules measure the fields by the states alone."""
+
+    def fun(t: float, x: Any, a: float = 0.3) -> list[Any]:
+        u, v = np.sign(x[0]), np.sign(x[1] - a * x[2])
+        return [-2 * u + 0.3 * v + 0.1 * u * v, -2 * v + 0.2 * x[2] - 0.1 * u, 1 + 0.2 * u * v * x[2]]
+
+    system = fl.System(fun, n=3)
+    tight: dict[str, Any] = {"sliding": rule, "rtol": 1e-12, "atol": 1e-12}
+
+    def run(y: Any, a: float = 0.3, **options: Any) -> fl.Solution:
+        return system.solve((0, 0.8), y, {"a": a}, **tight, **options)
+
+    start, d = np.array([0.3, 0.5, 0.1]), 1e-5
+    sol = run(start, wrt=["y0", "a"])
+    assert str(sol.segments[-1].mode) == "00"
+    sides = [(run(start + d * e).y[:, -1], run(start - d * e).y[:, -1]) for e in np.eye(3)]
+    sides.append((run(start, 0.3 + d).y[:, -1], run(start, 0.3 - d).y[:, -1]))
+    expected = np.array([(above - below) / (2 * d) for above, below in sides]).T
+    np.testing.assert_allclose(sol.derivative(), expected, rtol=0, atol=1e-9)

@@ -633,16 +633,17 @@ _WHY_LOST = {
 
 
 _WHY_SECOND_LOST = {
-    "start": "the run starts on a surface that it slides on",
-    "arrival": "an action puts the state beside a surface that the motion slides on",
+    "start": (
+        "the run starts on a surface that it slides on, and a start beside it is led back by the field of "
+        "its own side"
+    ),
+    "arrival": (
+        "an action puts the state on a surface that the motion slides on, and a state beside it is led back "
+        "by the field of its own side"
+    ),
     "accumulation": "infinitely many switches are jumped over",
-    "motion": (
-        "they are followed in regions and on surfaces slid on by Filippov's rule, and not in contact, at "
-        "rest or in sliding of higher order"
-    ),
-    "instant": (
-        "several functions fix the time of the instant, or one that is no surface and where the field jumps"
-    ),
+    "motion": "the Taylor series of the changes of the motion are too short for its steps",
+    "instant": "several functions fix the time of the instant",
 }
 
 _MOVED = "the start and by parameters that move the threshold"
@@ -698,11 +699,11 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
         t, why = lost
         text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"
         found.append(RunWarning(t, "no_derivative", text))
-    second = run.second_lost()
-    if second is not None and (lost is None or second[0] < lost[0]):
-        t, why = second
-        text = f"second derivatives are not known from t = {t:.10g} on: {_WHY_SECOND_LOST[why]}"
-        found.append(RunWarning(t, "no_derivative", text))
+    for t, why, are_some_known in run.second_lost():
+        if lost is None or t < lost[0]:
+            which = "some second derivatives" if are_some_known else "second derivatives"
+            text = f"{which} are not known from t = {t:.10g} on: {_WHY_SECOND_LOST[why]}"
+            found.append(RunWarning(t, "no_derivative", text))
     return found
 
 

@@ -228,17 +228,24 @@ fn odd_power(
         let p = graph.constant(p);
         graph.pow(base, p)
     };
-    match graph.known_sign(form) {
-        Some(Switching::Constant(1.0)) => return Some(power(graph, c, p)),
-        Some(Switching::Constant(-1.0)) => {
-            let opposite = graph.neg(c);
-            let power = power(graph, opposite, p);
-            return Some(graph.neg(power));
-        }
-        _ => {}
+    let known = match graph.known_sign(form) {
+        Some(Switching::Constant(sign)) => sign,
+        _ => match graph.range(c) {
+            (low, _) if low >= 0.0 => 1.0,
+            (_, high) if high <= 0.0 => -1.0,
+            _ => 0.0,
+        },
+    };
+    if known > 0.0 {
+        return Some(power(graph, c, p));
     }
-    // No motion changes it, and so it needs no surface for its sign.
-    let is_fixed = !graph.facts(c).varies;
+    if known < 0.0 {
+        let opposite = graph.neg(c);
+        let power = power(graph, opposite, p);
+        return Some(graph.neg(power));
+    }
+    // What no motion changes needs no surface for its sign, nor does what jumps only.
+    let is_fixed = !graph.facts(c).varies || graph.is_stepwise(c);
     if p <= 1.0 || !is_fixed && !has_kinks {
         return None;
     }

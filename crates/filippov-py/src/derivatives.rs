@@ -251,10 +251,11 @@ impl RunDerivatives {
         transposed(py, known.unwrap_or(&unknown), n_pairs, n)
     }
 
-    /// The time from which on second derivatives are not known.
-    pub fn second_lost(&self) -> Option<(f64, &'static str)> {
-        let lost = self.found.second_lost;
-        lost.map(|(t, why)| (t, why.name()))
+    /// From when on second derivatives are not known, why, and whether those of some columns are.
+    pub fn second_lost(&self) -> Vec<(f64, &'static str, bool)> {
+        let lost = self.found.second_lost.iter();
+        lost.map(|lost| (lost.t, lost.why.name(), lost.n_known > 0))
+            .collect()
     }
 
     /// The derivatives of the times of zeros of a function, the first component of a system: a row for each.

@@ -653,9 +653,10 @@ impl Run {
         derivatives.second_at(py, system, run, when)
     }
 
-    /// The time from which on second derivatives are not known.
-    fn second_lost(&self) -> Option<(f64, &'static str)> {
-        self.derivatives.as_ref()?.second_lost()
+    /// From when on second derivatives are not known, why, and whether those of some columns are.
+    fn second_lost(&self) -> Vec<(f64, &'static str, bool)> {
+        let derivatives = self.derivatives.as_ref();
+        derivatives.map_or_else(Vec::new, |found| found.second_lost())
     }
 
     /// Do derivatives end, or are they those of one side?
@@ -663,7 +664,7 @@ impl Run {
     fn warns_of_derivatives(&self) -> bool {
         let derivatives = self.derivatives.as_ref();
         derivatives.is_some_and(|found| {
-            let ends = found.lost().is_some() || found.second_lost().is_some();
+            let ends = found.lost().is_some() || !found.second_lost().is_empty();
             ends || !found.borders().is_empty()
         })
     }

@@ -641,7 +641,7 @@ impl<'w> Walk<'w> {
         let dt: Vec<f64> = columns.iter().map(|c| dot(&last.time, c)).collect();
         let mut arrives = false;
         for passage in passages {
-            arrives |= passage.apply(extended.n, &mut columns);
+            arrives |= !passage.apply(extended.n, &mut columns).is_empty();
         }
         self.borders.ends_at_instant |= arrives && record.t[1] == self.t_last;
         let landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;

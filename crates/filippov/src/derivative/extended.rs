@@ -484,6 +484,7 @@ impl Definition {
         };
         let values = vec![0.0; n_parameters];
         let system = TracedSystem::new(graph, field, values, names, backend)?;
+        let system = system.with_parameters_as_states(pairs.len());
         let system = system.watching(&self.rules.watched).sticking(&ratios);
         Ok((system.with_discrete(self.rules.laws.len()), made))
     }

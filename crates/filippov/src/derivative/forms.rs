@@ -2,17 +2,30 @@
 
 use filippov_expr::{Backend, ExprError, Graph, NodeId, Program};
 
+use crate::error::FieldError;
 use crate::system::{derivative_along, sides_of, Place, TracedSystem};
+use crate::tolerances::EPS;
 use crate::vectors::dot;
 
-/// Mixed derivatives of the state by two columns, n entries for each pair.
+/// Mixed derivatives of the state by two columns, n entries for each pair; NaN where they are not known.
 #[derive(Clone, Debug)]
 pub(super) struct Second {
     pub pairs: Vec<Vec<f64>>,
 }
 
+impl Second {
+    /// How many are known.
+    pub fn n_known(&self) -> usize {
+        self.pairs.iter().filter(|mixed| is_known(mixed)).count()
+    }
+}
+
+pub(super) fn is_known(mixed: &[f64]) -> bool {
+    mixed.iter().all(|value| value.is_finite())
+}
+
 /// Pairs of columns, each once, in order.
-pub(super) fn pairs(n_columns: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn pairs(n_columns: usize) -> impl Iterator<Item = (usize, usize)> + Clone {
     (0..n_columns).flat_map(|a| (0..=a).map(move |b| (a, b)))
 }
 
@@ -24,6 +37,14 @@ pub(super) struct Moved {
 }
 
 impl Moved {
+    /// A change of the state.
+    pub fn of_state(column: &[f64]) -> Moved {
+        Moved {
+            time: 0.0,
+            z: column.to_vec(),
+        }
+    }
+
     /// With a multiple of a motion with these rates.
     pub fn plus(&self, factor: f64, rates: &[f64]) -> Moved {
         let mut z = self.z.clone();
@@ -74,6 +95,48 @@ impl Form {
     }
 }
 
+/// The second derivative of functions of time and state along two changes, by differences of fourth order.
+///
+/// It is that of the line by the sum of the changes, less that by their difference, over four.
+pub(super) fn form_by_differences(
+    mut values: impl FnMut(f64, &[f64]) -> Result<Vec<f64>, FieldError>,
+    (t, z): (f64, &[f64]),
+    (u, v): (&Moved, &Moved),
+) -> Result<Vec<f64>, FieldError> {
+    let size = |by: &Moved| {
+        let entries = by.z.iter().zip(z);
+        let states = entries.map(|(d, z)| d.abs() / (1.0 + z.abs()));
+        states.fold(by.time.abs() / (1.0 + t.abs()), f64::max)
+    };
+    let (of_u, of_v) = (size(u), size(v));
+    let mut form = vec![0.0; values(t, z)?.len()];
+    if of_u == 0.0 || of_v == 0.0 {
+        return Ok(form);
+    }
+    let d = 2.0 * EPS.powf(1.0 / 6.0);
+    for (sign, share) in [(1.0, 0.25), (-1.0, -0.25)] {
+        let change = |a: f64, b: f64| a / of_u + sign * b / of_v;
+        for (k, weight) in [
+            (-2.0, -1.0),
+            (-1.0, 16.0),
+            (0.0, -30.0),
+            (1.0, 16.0),
+            (2.0, -1.0),
+        ] {
+            let entries = z.iter().zip(u.z.iter().zip(&v.z));
+            let moved = entries.map(|(z, (a, b))| z + k * d * change(*a, *b));
+            let moved: Vec<f64> = moved.collect();
+            let found = values(t + k * d * change(u.time, v.time), &moved)?;
+            add(
+                &mut form,
+                share * weight / (12.0 * d * d) * of_u * of_v,
+                &found,
+            );
+        }
+    }
+    Ok(form)
+}
+
 /// The first and second derivative of the map of an action at a point.
 pub(super) struct MapAt<'m> {
     pub rows: Vec<Vec<f64>>,
@@ -88,10 +151,13 @@ pub(super) struct MapAt<'m> {
 
 impl MapAt<'_> {
     /// The change of the extended state behind.
-    pub fn image(&self, n: usize, by: &Moved) -> Vec<f64> {
+    pub fn image(&self, n: usize, by: &Moved) -> Moved {
         let rows = self.rows.iter().zip(&self.by_time);
         let states = rows.map(|(row, by_time)| dot(row, &by.z) + by_time * by.time);
-        states.chain(by.z[n..].iter().copied()).collect()
+        Moved {
+            time: by.time,
+            z: states.chain(by.z[n..].iter().copied()).collect(),
+        }
     }
 
     /// The mixed derivative behind, from that before, that of the time, and both changes.

@@ -80,6 +80,9 @@ pub(super) struct Instant<'i, 'a> {
     pub after: &'i mut Piece<'a>,
 }
 
+/// The columns that do not stay on the surfaces slid on.
+pub(super) type Beside = SmallVec<[usize; 4]>;
+
 /// What an instant does to changes of the extended state.
 pub(super) struct Passage {
     /// The derivative of the time, a row.
@@ -95,20 +98,25 @@ pub(super) struct Passage {
 }
 
 impl Passage {
-    /// What becomes of changes of the extended state. Returns whether actions put one of them beside the surfaces slid on.
-    pub fn apply(&self, n: usize, columns: &mut [Vec<f64>]) -> bool {
+    /// What becomes of changes of the extended state. Returns those that actions put beside the surfaces slid on.
+    pub fn apply(&self, n: usize, columns: &mut [Vec<f64>]) -> Beside {
         let first = self.changes.len() - usize::from(self.arrives);
-        let (own, arrival) = self.changes.split_at(first);
-        let mut is_beside = false;
-        for column in columns {
+        let mut beside = Beside::new();
+        for (c, column) in columns.iter_mut().enumerate() {
+            let own = &self.changes[..first];
             own.iter().for_each(|change| change.apply(n, column));
-            for change in arrival {
+            if let Some(arrival) = self.arrival() {
                 let before = column.clone();
-                change.apply(n, column);
-                is_beside |= differ(&before, column);
+                arrival.apply(n, column);
+                beside.extend(differ(&before, column).then_some(c));
             }
         }
-        is_beside
+        beside
+    }
+
+    /// What brings a state that actions put beside the surfaces slid on to them.
+    pub fn arrival(&self) -> Option<&Change> {
+        self.changes.last().filter(|_| self.arrives)
     }
 }
 

@@ -7,6 +7,8 @@ use std::collections::VecDeque;
 
 use smallvec::SmallVec;
 
+use super::forms::pairs;
+use super::second::Timed;
 use crate::mode::Mode;
 use crate::motion::Guard;
 use crate::record::InstantRecord;
@@ -26,6 +28,8 @@ struct Past {
     dt: Vec<f64>,
     /// The derivative of the state before by each column, one behind the other.
     columns: Vec<f64>,
+    /// The second derivatives of its time and of the state at that time, if they are followed.
+    second: Option<Timed>,
 }
 
 impl Past {
@@ -64,6 +68,16 @@ impl Rounds {
     /// r / (1 - r).
     fn share(&self) -> f64 {
         self.ratio / (1.0 - self.ratio)
+    }
+
+    /// The derivatives of r / (1 - r) by two columns each, and the mixed one, from those of both rounds.
+    fn bend(&self, late: [f64; 3], early: [f64; 3]) -> [f64; 3] {
+        let by = |k: usize| (late[k] - self.ratio * early[k]) / self.early;
+        let (a, b) = (by(0), by(1));
+        let mixed = by(2) - (a * early[1] + b * early[0]) / self.early;
+        let rest = 1.0 - self.ratio;
+        let slope = rest.powi(-2);
+        [slope * a, slope * b, slope * (mixed + 2.0 * a * b / rest)]
     }
 
     /// The derivative of r / (1 - r) by the length of the later round.
@@ -119,6 +133,8 @@ pub(super) struct History(VecDeque<Past>);
 pub(super) struct Limit {
     pub dt: Vec<f64>,
     pub dx: Vec<Vec<f64>>,
+    /// The mixed derivatives of both, for every pair of columns, if they are followed.
+    pub second: Option<(Vec<f64>, Vec<Vec<f64>>)>,
 }
 
 impl History {
@@ -143,11 +159,18 @@ impl History {
                 .map(|factors| dot(factors, &past.dt))
                 .collect();
             past.columns = columns;
+            past.second = None;
         }
     }
 
     /// Takes an instant down, with the columns before it and the derivatives of its time.
-    pub fn push(&mut self, record: &InstantRecord, columns: &[Vec<f64>], dt: &[f64]) {
+    pub fn push(
+        &mut self,
+        record: &InstantRecord,
+        columns: &[Vec<f64>],
+        dt: &[f64],
+        second: Option<Timed>,
+    ) {
         let n = record.x[0].len();
         let states = columns.iter().flat_map(|column| &column[..n]).copied();
         // The room of the oldest is used again.
@@ -164,10 +187,12 @@ impl History {
                 mode: record.mode[0].clone(),
                 dt: dt.to_vec(),
                 columns: states.collect(),
+                second,
             });
             return;
         };
         past.t = record.t[0];
+        past.second = second;
         past.guards = record.guards.into();
         past.mode.clone_from(record.mode[0]);
         let rows = [
@@ -206,6 +231,46 @@ impl History {
             });
             dx.push(limit.collect());
         }
-        Some(Limit { dt, dx })
+        let second = second_of([now, before, first], &rounds);
+        Some(Limit { dt, dx, second })
     }
+}
+
+/// The mixed derivatives of the limit of three instants, the latest first: of its time, and of its state.
+fn second_of(
+    [now, before, first]: [&Past; 3],
+    rounds: &Rounds,
+) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let all = [now, before, first].map(|past| past.second.as_ref());
+    let [Some(own), Some(earlier), Some(earliest)] = all else {
+        return None;
+    };
+    let share = rounds.share();
+    let (mut times, mut states) = (Vec::new(), Vec::new());
+    for (k, (a, b)) in pairs(now.dt.len()).enumerate() {
+        let length = |late: &Past, early: &Past, mixed: f64| {
+            [late.dt[a] - early.dt[a], late.dt[b] - early.dt[b], mixed]
+        };
+        let late = length(now, before, own.times[k] - earlier.times[k]);
+        let early = length(before, first, earlier.times[k] - earliest.times[k]);
+        let bent = rounds.bend(late, early);
+        // The mixed derivative of what is added to the last value: a difference times the share.
+        let added = |size: f64, by: [f64; 3]| {
+            by[2] * share + by[0] * bent[1] + by[1] * bent[0] + size * bent[2]
+        };
+        times.push(own.times[k] + added(rounds.late, late));
+        let by = |past: &Past, c: usize| past.dx(c).collect::<Vec<f64>>();
+        let [now_a, now_b, before_a, before_b] =
+            [by(now, a), by(now, b), by(before, a), by(before, b)];
+        let state = (0..now.x.len()).map(|i| {
+            let moved = [
+                now_a[i] - before_a[i],
+                now_b[i] - before_b[i],
+                own.states[k][i] - earlier.states[k][i],
+            ];
+            own.states[k][i] + added(now.x[i] - before.x[i], moved)
+        });
+        states.push(state.collect());
+    }
+    Some((times, states))
 }

@@ -38,4 +38,4 @@ pub use held::{ActionAt, GuardAt, HeldMotion};
 pub use instant::Lost;
 pub use one_sided::OneSided;
 pub use passing::InstantDerivative;
-pub use tangents::{Derivatives, SecondLost, Tangents};
+pub use tangents::{Derivatives, LostSecond, SecondLost, Tangents};

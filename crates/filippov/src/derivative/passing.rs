@@ -6,7 +6,7 @@ use super::change::{matrices, Row};
 use super::forms::Second;
 use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, OneSided};
-use super::second::SecondOrder;
+use super::second::{SecondOrder, Timed};
 use crate::error::FieldError;
 use crate::vectors::dot;
 
@@ -66,14 +66,14 @@ impl InstantDerivative {
     }
 }
 
-impl Instant<'_, '_> {
+impl<'a> Instant<'_, 'a> {
     /// The derivatives of the instant, and the columns after it; one for each switch if different functions fix their times.
     pub(super) fn pass(
         &mut self,
         weights: &Weights,
         columns: &mut [Vec<f64>],
         second: &mut Option<Second>,
-    ) -> Result<Vec<InstantDerivative>, FieldError> {
+    ) -> Result<(Vec<InstantDerivative>, Option<Timed>), FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
         let mut condition = f64::NAN;
         let passages = match self.through(weights, &mut condition)? {
@@ -83,36 +83,33 @@ impl Instant<'_, '_> {
                 let mut found = InstantDerivative::unknown(t, columns.len(), (n, m));
                 (found.condition, found.lost) = (condition, Some(lost));
                 self.add_sides(&mut found)?;
-                return Ok(vec![found]);
+                return Ok((vec![found], None));
             }
         };
         let mixed = second.take();
-        let mut second_dt = Vec::new();
+        let mut timed = None;
         if let ([passage], Some(pairs)) = (&passages[..], mixed) {
-            let mut order = SecondOrder {
-                extended: self.extended,
-                record: self.record,
-                before: self.before,
-                after: self.after,
-                time: &passage.time,
-                goes_on: passage.goes_on,
-            };
-            if let Some((behind, times)) = order.pass(columns, &pairs)? {
+            let mut order = self.second_order(&passage.time, passage.goes_on);
+            if let Some((behind, own)) = order.pass(columns, &pairs)? {
                 *second = Some(behind);
-                second_dt = times;
+                timed = Some(own);
             }
         }
         let mut all = Vec::with_capacity(passages.len());
         for passage in &passages {
             let mut found = InstantDerivative::new(self.record.t[0]);
             found.condition = condition;
-            found.second_dt.clone_from(&second_dt);
+            if let Some(timed) = &timed {
+                found.second_dt.clone_from(&timed.times);
+            }
             let dt = columns.iter().map(|column| dot(&passage.time, column));
             found.dt.extend(dt);
-            found.arrives = passage.apply(n, columns);
-            if found.arrives {
-                *second = None;
-                found.second_dt.clear();
+            let beside = passage.apply(n, columns);
+            found.arrives = !beside.is_empty();
+            if let (Some(second), Some(arrival)) = (&mut *second, passage.arrival()) {
+                let z = self.extended.state(self.record.x[1]);
+                let at = (self.record.t[1], &z[..]);
+                second.arrive((self.after, arrival), at, columns, &beside)?;
             }
             (found.saltation, found.by_parameters) = matrices(&passage.changes, (n, m));
             let is_finite = columns.iter().flatten().all(|v| v.is_finite());
@@ -122,7 +119,23 @@ impl Instant<'_, '_> {
             }
             all.push(found);
         }
-        Ok(all)
+        Ok((all, timed))
+    }
+
+    /// Up to second order, with the derivative of its time.
+    pub(super) fn second_order<'o>(
+        &'o mut self,
+        time: &'o [f64],
+        goes_on: bool,
+    ) -> SecondOrder<'o, 'a> {
+        SecondOrder {
+            extended: self.extended,
+            record: self.record,
+            before: self.before,
+            after: self.after,
+            time,
+            goes_on,
+        }
     }
 
     /// Adds what is known of an instant without a derivative.

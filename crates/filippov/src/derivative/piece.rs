@@ -8,8 +8,8 @@ use smallvec::SmallVec;
 use super::change::{Change, Row, Rows};
 use super::collocation::{operations, Collocation};
 use super::extended::Extended;
-use super::forms::{pairs, Second};
-use super::radau::NODES;
+use super::forms::{add, form_by_differences, is_known, pairs, Moved, Second};
+use super::radau::{INTEGRALS, NODES, STAGES};
 use super::series::{Carried, ChangeSeries, Changes};
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
@@ -31,6 +31,9 @@ const SHORTEST_OF_PAIRS: f64 = 1e-3;
 
 /// Stiff steps are not divided into more than so many parts.
 const MOST_PARTS: f64 = 16.0;
+
+/// So many iterations at most for the state at the end of a part.
+const MOST_ITERATIONS: usize = 60;
 
 /// How long a part of a step may be, in units of 1 / |Df|: one of length z has the relative error 7e-15 z^14.
 fn longest_part(rtol: f64) -> f64 {
@@ -92,7 +95,7 @@ pub(super) struct Piece<'a> {
     /// The surfaces slid on.
     pub sliding: Vec<usize>,
     /// The surfaces in contact.
-    contacts: Vec<usize>,
+    pub contacts: Vec<usize>,
     sides: Vec<i8>,
     pub signs: Vec<f64>,
     pub field: ModeField<'a>,
@@ -322,8 +325,8 @@ impl<'a> Piece<'a> {
         Ok(())
     }
 
-    /// Carries the mixed derivatives of all pairs of columns over a step, with the columns at its start; `false` if the motion has no
-    /// series for them.
+    /// Carries the mixed derivatives of all pairs of columns over a step, with the columns at its start; `false` if the series of the
+    /// motion are too short for them.
     pub fn advance_pairs(
         &mut self,
         mut path: impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
@@ -339,9 +342,11 @@ impl<'a> Piece<'a> {
             false => None,
         };
         let Some(series) = series else {
-            return Ok(false);
+            self.advance_pairs_by_differences(path, (t0, t1), columns, second)?;
+            return Ok(true);
         };
-        for ((a, b), mixed) in pairs(columns.len()).zip(&mut second.pairs) {
+        let all = pairs(columns.len()).zip(&mut second.pairs);
+        for ((a, b), mixed) in all.filter(|(_, mixed)| is_known(mixed)) {
             mixed.resize(self.point.len(), 0.0);
             let changes = [&columns[a][..], &columns[b], mixed];
             series.take(&self.point, changes, &mut self.carried);
@@ -363,6 +368,73 @@ impl<'a> Piece<'a> {
             mixed.extend(found.into_iter().flat_map(|found| &found[..n]));
         }
         Ok(true)
+    }
+
+    /// The same by differences of the state at the end of the step by that at its start.
+    fn advance_pairs_by_differences(
+        &mut self,
+        mut path: impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
+        (t0, t1): (f64, f64),
+        columns: &[Vec<f64>],
+        second: &mut Second,
+    ) -> Result<(), FieldError> {
+        let n = self.extended.n;
+        let mut changes: Vec<Moved> = columns
+            .iter()
+            .map(|column| Moved::of_state(column))
+            .collect();
+        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
+        for part in 0..parts {
+            let start = t0 + part as f64 * dt;
+            self.take(&mut path, start, dt)?;
+            path(start, &mut self.point[..n])?;
+            let z = self.point.clone();
+            let all = pairs(columns.len()).zip(&mut second.pairs);
+            for ((a, b), mixed) in all.filter(|(_, mixed)| is_known(mixed)) {
+                let along = (&changes[a], &changes[b]);
+                let end = |t: f64, z: &[f64]| self.end_of(t, dt, z);
+                let bend = form_by_differences(end, (start, &z), along)?;
+                let mut carried = [mixed.clone()];
+                carried[0].resize(z.len(), 0.0);
+                self.collocation.carry(&self.nodes, dt, &mut carried);
+                mixed.copy_from_slice(&carried[0][..n]);
+                add(mixed, 1.0, &bend);
+            }
+            for change in &mut changes {
+                let column = std::slice::from_mut(&mut change.z);
+                self.collocation.carry(&self.nodes, dt, column);
+            }
+        }
+        Ok(())
+    }
+
+    /// The state of the motion from a place a time dt later, with the stages found by iteration; NaN if that does not converge.
+    fn end_of(&mut self, t: f64, dt: f64, z: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let n = self.extended.n;
+        let mut stages = vec![z.to_vec(); STAGES];
+        let mut rates = vec![vec![0.0; z.len()]; STAGES];
+        for _ in 0..MOST_ITERATIONS {
+            for ((stage, rates), node) in stages.iter().zip(&mut rates).zip(&NODES) {
+                let time = t + node * dt;
+                self.field
+                    .eval_unprojected(time, &mut stage.clone(), rates)?;
+            }
+            let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            for (stage, weights) in stages.iter_mut().zip(&INTEGRALS) {
+                for r in 0..n {
+                    let terms = weights.iter().zip(&rates).map(|(w, rates)| w * rates[r]);
+                    let value = z[r] + dt * terms.sum::<f64>();
+                    change = change.max((value - stage[r]).abs());
+                    size = size.max(value.abs());
+                    stage[r] = value;
+                }
+            }
+            if change <= 2.0 * EPS * size {
+                stages[STAGES - 1].truncate(n);
+                return Ok(stages.pop().unwrap_or_default());
+            }
+        }
+        Ok(vec![f64::NAN; n])
     }
 
     /// Finds the derivatives of the field at a point, for [`rates_along`](Self::rates_along).
@@ -486,9 +558,15 @@ impl<'a> Piece<'a> {
                 dense[r * size + c] = -(above - below) / (2.0 * d);
             }
         }
+        let d = EPS.cbrt() * (1.0 + t.abs());
+        for (side, rates) in [(d, &mut above), (-d, &mut below)] {
+            moved.copy_from_slice(&self.point);
+            self.field.eval_unprojected(t + side, &mut moved, rates)?;
+        }
         self.nodes[node].fill(|values, time| {
             values.copy_from_slice(&dense);
-            time.fill(f64::NAN);
+            let rates = time.iter_mut().zip(above.iter().zip(&below));
+            rates.for_each(|(rate, (above, below))| *rate = (above - below) / (2.0 * d));
         });
         Ok(())
     }

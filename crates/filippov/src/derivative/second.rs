@@ -4,14 +4,18 @@
 //! and b + tau_b F- the changes of the point at which it happens, the derivatives of time and map up to second order give that of the
 //! state behind it (`docs/theory/derivatives.md`).
 
+use super::change::Change;
 use super::extended::{Column, Extended};
-use super::forms::{add, pairs, Moved, Second};
+use super::forms::{add, form_by_differences, is_known, pairs, Form, Moved, Second};
 use super::instant::arrival;
 use super::piece::Piece;
 use crate::error::FieldError;
 use crate::motion::Guard;
 use crate::record::InstantRecord;
+use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
+
+use std::sync::Arc;
 
 /// An instant, for second derivatives.
 pub(super) struct SecondOrder<'i, 'a> {
@@ -25,157 +29,278 @@ pub(super) struct SecondOrder<'i, 'a> {
     pub goes_on: bool,
 }
 
+/// An instant up to second order: the states before it at its time, and its time.
+pub(super) struct Timed {
+    /// By each column, the derivative of the time and the change of the point.
+    changes: Vec<(f64, Moved)>,
+    /// The mixed derivatives of the state, n entries for each pair of columns.
+    pub states: Vec<Vec<f64>>,
+    /// Those of the time; NaN where the end of a multiplier fixes it at which the field goes on.
+    pub times: Vec<f64>,
+}
+
 impl SecondOrder<'_, '_> {
-    /// The mixed derivatives behind the instant, from the columns before, and those of its time, NaN where a multiplier fixes that;
-    /// `None` for instants of which they are not known.
+    /// The mixed derivatives behind the instant, from the columns before; `None` for instants of which they are not known.
     pub fn pass(
         &mut self,
         columns: &[Vec<f64>],
         second: &Second,
-    ) -> Result<Option<(Second, Vec<f64>)>, FieldError> {
-        let (n, size) = (
-            self.extended.n,
-            self.extended.n + self.extended.n_parameters(),
-        );
-        let record = self.record;
-        let [z_before, z_after] = record.x.map(|x| self.extended.state(x));
-        let pad = |field: &[f64]| [field, &vec![0.0; size - n]].concat();
-        let [f_before, f_after] = record.field.map(pad);
+    ) -> Result<Option<(Second, Timed)>, FieldError> {
+        let (extended, record) = (self.extended, self.record);
+        let mut moving = record.acts.iter().filter(|act| extended.moves(act.index));
+        let map = match (moving.next(), moving.next()) {
+            (None, _) => None,
+            (Some(act), None) => match extended.second_of_map(record.t[0], act)? {
+                None => return Ok(None),
+                known => known,
+            },
+            _ => return Ok(None),
+        };
+        let Some(timed) = self.timed(columns, second)? else {
+            return Ok(None);
+        };
+        let z = extended.state(record.x[1]);
+        let at = (record.t[1], &z[..], record.field[1]);
+        let mut found = match map {
+            None => behind(
+                self.after,
+                at,
+                &timed.changes,
+                (&timed.states, &timed.times),
+            )?,
+            Some(map) => {
+                let changes = timed.changes.iter();
+                let changes: Vec<(f64, Moved)> = changes
+                    .map(|(tau, w)| (*tau, map.image(extended.n, w)))
+                    .collect();
+                let all = pairs(columns.len()).zip(timed.states.iter().zip(&timed.times));
+                let states = all.map(|((a, b), (state, tau))| {
+                    let [a, b] = [a, b].map(|c| &timed.changes[c].1);
+                    map.second_image(state, *tau, a, b)
+                });
+                let states: Vec<Vec<f64>> = states.collect();
+                behind(self.after, at, &changes, (&states, &timed.times))?
+            }
+        };
+        let arrives = !record.acts.is_empty() && arrival(self.after, record.t[1], &z)?.is_some();
+        if !arrives {
+            found.hold(self.after, record.t[1], &z)?;
+        }
+        Ok(Some((found, timed)))
+    }
+
+    /// The instant itself, whatever comes behind it.
+    pub fn timed(
+        &mut self,
+        columns: &[Vec<f64>],
+        second: &Second,
+    ) -> Result<Option<Timed>, FieldError> {
         if self.time.iter().any(|v| v.is_nan()) {
             return Ok(None);
         }
+        let (t, field) = (self.record.t[0], self.record.field[0]);
+        let z = self.extended.state(self.record.x[0]);
+        let still = Moved::of_state(&vec![0.0; z.len()]);
+        let by_field = still.plus(1.0, field);
         let is_timed = self.time.iter().any(|v| *v != 0.0);
-        let place = self.before.at(record.t[0], &z_before);
         // The second derivative of what fixes the time, and its rate: the row of the time is minus its gradient over it.
-        let fixing = match record.guards {
+        let fixing = match *self.record.guards {
             _ if self.goes_on => None,
-            [Guard::Surface(j)] => {
-                let mut normal = vec![0.0; size];
-                let by_time = self
-                    .before
-                    .gradient(*j, record.t[0], &z_before, &mut normal)?;
-                let rate = by_time + dot(&normal, &f_before);
-                match self.extended.form_of_surface(*j) {
-                    Ok(form) => Some((form, rate)),
-                    Err(_) => return Ok(None),
+            [guard] => {
+                let by = self.before.gradient_of(guard, t, &z)?;
+                let rate = by.time + dot(&by.state, &by_field.z);
+                match guard {
+                    Guard::Surface(j) => match self.extended.form_of_surface(j) {
+                        Ok(form) => Some((Bend::Form(form), rate)),
+                        Err(_) => return Ok(None),
+                    },
+                    guard => Some((Bend::Guard(guard), rate)),
                 }
             }
             [] if !is_timed => None,
             [] => {
-                let mut acts = record.acts.iter();
+                let place = self.before.at(t, &z);
+                let mut acts = self.record.acts.iter();
                 let tick =
                     acts.find_map(|act| self.extended.form_of_tick(act.index, &place).ok()?);
                 match tick {
                     None => return Ok(None),
-                    known => known,
+                    Some((form, rate)) => Some((Bend::Form(form), rate)),
                 }
             }
             _ => return Ok(None),
         };
-        let moving = record
-            .acts
+        self.before.look_at(t, &z)?;
+        let own = self.before.rates_along(1.0, &by_field.z);
+        let alongs: Vec<Vec<f64>> = columns
             .iter()
-            .filter(|act| self.extended.moves(act.index));
-        let moving: Vec<_> = moving.collect();
-        if moving.len() > 1 {
-            return Ok(None);
-        }
-        self.before.look_at(record.t[0], &z_before)?;
-        self.after.look_at(record.t[1], &z_after)?;
-        let (before, after) = (&*self.before, &*self.after);
-        let along = |piece: &Piece, by: &Moved| piece.rates_along(by.time, &by.z);
-        let unit = |time: f64, z: &[f64]| Moved {
-            time,
-            z: z.to_vec(),
-        };
-        let own = along(before, &unit(1.0, &f_before));
-        let next = along(after, &unit(1.0, &f_after));
-        let place = before.at(record.t[0], &z_before);
-        let map = match moving.first() {
-            None => None,
-            Some(act) => match self.extended.second_of_map(record.t[0], act)? {
-                None => return Ok(None),
-                known => known,
-            },
-        };
-        let firsts: Vec<First> = columns
-            .iter()
-            .map(|column| {
-                let tau = dot(self.time, column);
-                let w = unit(0.0, column).plus(tau, &f_before);
-                let r = match &map {
-                    None => w.clone(),
-                    Some(map) => Moved {
-                        time: w.time,
-                        z: map.image(n, &w),
-                    },
-                };
-                First {
-                    tau,
-                    along: along(before, &unit(0.0, column)),
-                    behind: along(after, &r),
-                    w,
-                }
-            })
+            .map(|column| self.before.rates_along(0.0, column))
             .collect();
-        let mut found = Vec::with_capacity(second.pairs.len());
-        let mut times = Vec::with_capacity(second.pairs.len());
+        let mut timed = Timed {
+            changes: Vec::with_capacity(columns.len()),
+            states: Vec::with_capacity(second.pairs.len()),
+            times: Vec::with_capacity(second.pairs.len()),
+        };
+        timed.changes.extend(columns.iter().map(|column| {
+            let tau = dot(self.time, column);
+            (tau, Moved::of_state(column).plus(tau, field))
+        }));
         for ((a, b), mixed) in pairs(columns.len()).zip(&second.pairs) {
-            let (a, b) = (&firsts[a], &firsts[b]);
-            let mut q = mixed.clone();
-            add(&mut q, a.tau, &b.along);
-            add(&mut q, b.tau, &a.along);
-            add(&mut q, a.tau * b.tau, &own);
-            let mut tau = 0.0;
-            if let Some((form, rate)) = &fixing {
-                let bend = form.at(&self.extended.system, &place, &a.w, &b.w)[0];
-                tau = dot(self.time, &q) - bend / rate;
-                add(&mut q, tau, record.field[0]);
-            }
-            let mut behind = match &map {
-                None => q,
-                Some(map) => map.second_image(&q, tau, &a.w, &b.w),
-            };
-            if !self.goes_on {
-                add(&mut behind, -tau, record.field[1]);
-            }
-            add(&mut behind, -a.tau, &b.behind);
-            add(&mut behind, -b.tau, &a.behind);
-            add(&mut behind, a.tau * b.tau, &next);
-            found.push(behind);
-            times.push(if self.goes_on { f64::NAN } else { tau });
-        }
-        let graph = self.extended.system.graph();
-        let is_plane = |&j: &usize| graph.is_affine(graph.clone().surface(j as u32));
-        if after.sliding.iter().all(is_plane) {
-            let arrival = match record.acts.is_empty() {
-                true => None,
-                false => arrival(after, record.t[1], &z_after)?,
-            };
-            let held = match arrival {
-                None => after.projection(&[], record.t[1], &z_after)?,
-                known => known,
-            };
-            if let Some(held) = held {
-                for mixed in &mut found {
-                    let mut padded = pad(mixed);
-                    held.apply(n, &mut padded);
-                    mixed.copy_from_slice(&padded[..n]);
+            let mut state = mixed.clone();
+            let mut time = if self.goes_on { f64::NAN } else { 0.0 };
+            if is_known(mixed) {
+                let [(tau_a, of_a), (tau_b, of_b)] = [a, b].map(|c| &timed.changes[c]);
+                add(&mut state, *tau_a, &alongs[b]);
+                add(&mut state, *tau_b, &alongs[a]);
+                add(&mut state, tau_a * tau_b, &own);
+                if let Some((bend, rate)) = &fixing {
+                    let bend = bend.along(self.before, (t, &z), (of_a, of_b))?;
+                    time = dot(self.time, &state) - bend / rate;
+                    add(&mut state, time, field);
                 }
+            } else {
+                time = f64::NAN;
             }
+            timed.states.push(state);
+            timed.times.push(time);
         }
-        let is_finite = found.iter().flatten().all(|value| value.is_finite());
-        Ok(is_finite.then_some((Second { pairs: found }, times)))
+        Ok(Some(timed))
     }
 }
 
-/// What a column is at an instant: the derivative of its time, the change of its point, and the rates along the column before, and
-/// along its image behind.
-struct First {
-    tau: f64,
-    w: Moved,
-    along: Vec<f64>,
-    behind: Vec<f64>,
+/// The second derivative of what fixes the time of an instant.
+enum Bend {
+    /// Of a function of the graph.
+    Form(Arc<Form>),
+    /// Of a guard that the motion follows.
+    Guard(Guard),
+}
+
+impl Bend {
+    /// Along two changes at a place.
+    fn along(
+        &self,
+        before: &mut Piece,
+        (t, z): (f64, &[f64]),
+        (u, v): (&Moved, &Moved),
+    ) -> Result<f64, FieldError> {
+        Ok(match self {
+            Bend::Form(form) => form.at(&before.extended.system, &before.at(t, z), u, v)[0],
+            Bend::Guard(guard) => {
+                let value = |t: f64, z: &[f64]| Ok(vec![before.field.value_of(*guard, t, z)?]);
+                form_by_differences(value, (t, z), (u, v))?[0]
+            }
+        })
+    }
+}
+
+/// Are the surfaces slid on planes, and those in contact too, with rates that are affine?
+fn are_planes(piece: &Piece) -> bool {
+    let system = &piece.extended.system;
+    let mut graph = system.graph().clone();
+    let mut is_plane = |&j: &usize| {
+        let surface = graph.surface(j as u32);
+        graph.is_affine(surface)
+    };
+    let mut surfaces = piece.sliding.iter().chain(&piece.contacts);
+    if !surfaces.all(&mut is_plane) {
+        return false;
+    }
+    piece.contacts.iter().all(|&j| {
+        let surface = graph.surface(j as u32);
+        let states = graph.gradient(surface).states;
+        let mut rates = states
+            .iter()
+            .map(|(i, _)| system.field_nodes()[*i as usize]);
+        rates.all(|rate| graph.is_affine(rate))
+    })
+}
+
+impl Second {
+    /// Takes from them what leads off planes that the motion keeps to: rounding, or what a limit left.
+    pub fn hold(&mut self, piece: &Piece, t: f64, z: &[f64]) -> Result<(), FieldError> {
+        if piece.codimension() > 0 && are_planes(piece) {
+            if let Some(held) = piece.projection(&[], t, z)? {
+                self.apply(piece.extended.n, &held, z.len());
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a change of all of them.
+    fn apply(&mut self, n: usize, change: &Change, size: usize) {
+        for mixed in &mut self.pairs {
+            mixed.resize(size, 0.0);
+            change.apply(n, mixed);
+            mixed.truncate(n);
+        }
+    }
+
+    /// Goes on at a start on surfaces slid on, or where an action puts the state there. A state beside them is led back by the field
+    /// of its own side: pairs with a column that goes there have no second derivative, nor have those that leave a curved surface.
+    pub fn arrive(
+        &mut self,
+        (piece, arrival): (&Piece, &Change),
+        (t, z): (f64, &[f64]),
+        columns: &[Vec<f64>],
+        beside: &[usize],
+    ) -> Result<(), FieldError> {
+        let n = piece.extended.n;
+        let normals = piece.normals(t, z)?;
+        let is_curved = !are_planes(piece);
+        for ((a, b), mixed) in pairs(columns.len()).zip(&mut self.pairs) {
+            let mut leaves = beside.contains(&a) || beside.contains(&b);
+            let along = (Moved::of_state(&columns[a]), Moved::of_state(&columns[b]));
+            for (&j, normal) in piece.sliding.iter().zip(&normals).filter(|_| is_curved) {
+                let Ok(form) = piece.extended.form_of_surface(j) else {
+                    leaves = true;
+                    break;
+                };
+                let bend = form.at(&piece.extended.system, &piece.at(t, z), &along.0, &along.1)[0];
+                let off = dot(&normal[..n], mixed);
+                leaves |= (bend + off).abs() > AT_SIDE * (bend.abs() + off.abs());
+            }
+            if leaves {
+                mixed.fill(f64::NAN);
+            }
+        }
+        if !is_curved {
+            self.apply(n, arrival, z.len());
+        }
+        Ok(())
+    }
+}
+
+/// The mixed derivatives behind an instant or a limit of instants, from those of the state at its time and those of the time, NaN if
+/// the same field goes on; `changes` are by each column the derivative of the time and the change of the point behind.
+pub(super) fn behind(
+    after: &mut Piece,
+    (t, z, field): (f64, &[f64], &[f64]),
+    changes: &[(f64, Moved)],
+    (states, times): (&[Vec<f64>], &[f64]),
+) -> Result<Second, FieldError> {
+    after.look_at(t, z)?;
+    let still = Moved::of_state(&vec![0.0; z.len()]);
+    let own = after.rates_along(1.0, &still.plus(1.0, field).z);
+    let rates = changes
+        .iter()
+        .map(|(_, change)| after.rates_along(change.time, &change.z));
+    let rates: Vec<Vec<f64>> = rates.collect();
+    let all = pairs(changes.len()).zip(states.iter().zip(times));
+    let found = all.map(|((a, b), (state, time))| {
+        let (tau_a, tau_b) = (changes[a].0, changes[b].0);
+        let mut mixed = state.clone();
+        if !time.is_nan() {
+            add(&mut mixed, -time, field);
+        }
+        add(&mut mixed, -tau_a, &rates[b]);
+        add(&mut mixed, -tau_b, &rates[a]);
+        add(&mut mixed, tau_a * tau_b, &own);
+        mixed
+    });
+    Ok(Second {
+        pairs: found.collect(),
+    })
 }
 
 /// The mixed derivatives at the start of a run, with the velocity there: a run that begins later has moved less.

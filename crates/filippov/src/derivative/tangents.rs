@@ -6,12 +6,12 @@ use super::borders::{
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
-use super::forms::{pairs, Second};
-use super::instant::{arrival, Instant, Lost, Weights};
+use super::forms::{pairs, Moved, Second};
+use super::instant::{arrival, Beside, Instant, Lost, Weights};
 use super::limit::History;
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
-use super::second::at_start;
+use super::second::{at_start, behind, Timed};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Keep, Options};
@@ -33,12 +33,24 @@ pub struct Derivatives {
     /// The mixed second derivatives at each of them, if they are followed: for every pair of columns (a, b) with b <= a, in order, those
     /// of the state. NaN where they are not known.
     pub second: Vec<f64>,
-    /// The time from which on the second derivatives are not known, and why.
-    pub second_lost: Option<(f64, SecondLost)>,
+    /// From when on second derivatives are not known, and why.
+    pub second_lost: Vec<LostSecond>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
     /// Where they are those of one side.
     pub borders: Borders,
+}
+
+/// A time from which on fewer second derivatives are known than before.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct LostSecond {
+    /// The time.
+    pub t: f64,
+    /// Why.
+    pub why: SecondLost,
+    /// For how many pairs of columns they are known then.
+    pub n_known: usize,
 }
 
 /// Why second derivatives are not known from a time on, from which first ones may be.
@@ -51,9 +63,9 @@ pub enum SecondLost {
     Arrival,
     /// Infinitely many switches were jumped over.
     Accumulation,
-    /// The motion has no Taylor series of its changes.
+    /// The series of the changes are too short for the steps.
     Motion,
-    /// The formula of an instant does not hold: several functions fix its time, or a guard that is no surface, where the field jumps.
+    /// Several functions fix the time of an instant.
     Instant,
 }
 
@@ -196,8 +208,16 @@ impl<'a> Tangents<'a> {
         self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
         let starts_on = surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
-            self.drop_second(SecondLost::Start);
-            self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
+            let mut beside = Beside::new();
+            for (c, column) in self.columns.iter_mut().enumerate() {
+                let before = column.clone();
+                arrival.apply(n, column);
+                beside.extend(differ(&before, column).then_some(c));
+            }
+            if let Some(second) = &mut self.second {
+                self.second_lost = SecondLost::Start;
+                second.arrive((&piece, &arrival), (t, &z), &self.columns, &beside)?;
+            }
         }
         let borders = &mut self.found.borders;
         borders.starts_on = starts_on;
@@ -206,12 +226,6 @@ impl<'a> Tangents<'a> {
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
-    }
-
-    fn drop_second(&mut self, why: SecondLost) {
-        if self.second.take().is_some() {
-            self.second_lost = why;
-        }
     }
 
     fn keep(&mut self, t: f64) {
@@ -227,16 +241,30 @@ impl<'a> Tangents<'a> {
         }
         if self.has_second {
             let n = self.around.extended.n;
+            let all = pairs(self.kinds.len());
             match &self.second {
                 Some(second) => self.found.second.extend(second.pairs.iter().flatten()),
                 None => {
-                    let lost = (t, self.second_lost);
-                    self.found.second_lost.get_or_insert(lost);
-                    let unknown = pairs(self.kinds.len()).flat_map(|_| vec![f64::NAN; n]);
+                    let unknown = all.clone().flat_map(|_| vec![f64::NAN; n]);
                     self.found.second.extend(unknown);
                 }
             }
+            let known = self.n_second_known();
+            let before = self.found.second_lost.last().map(|lost| lost.n_known);
+            if known < before.unwrap_or_else(|| all.count()) {
+                let lost = LostSecond {
+                    t,
+                    why: self.second_lost,
+                    n_known: known,
+                };
+                self.found.second_lost.push(lost);
+            }
         }
+    }
+
+    /// For how many pairs of columns the second derivative is known.
+    fn n_second_known(&self) -> usize {
+        self.second.as_ref().map_or(0, Second::n_known)
     }
 
     fn keep_instant(&mut self, found: InstantDerivative) {
@@ -302,9 +330,12 @@ impl<'a> Tangents<'a> {
                 Ok(())
             };
             if let Some(second) = &mut self.second {
-                if !piece.advance_pairs(along, (t0, t1), &self.columns, second)? {
-                    self.drop_second(SecondLost::Motion);
+                let known = second.n_known();
+                let goes_on = piece.advance_pairs(along, (t0, t1), &self.columns, second)?;
+                if !goes_on || second.n_known() < known {
+                    self.second_lost = SecondLost::Motion;
                 }
+                self.second = self.second.take().filter(|_| goes_on);
             }
             piece.advance(along, (t0, t1), &mut self.columns)?;
             if piece.codimension() > 0 {
@@ -329,9 +360,6 @@ impl<'a> Tangents<'a> {
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
         let is_accumulation = record.t[0] != record.t[1];
-        if is_accumulation {
-            self.drop_second(SecondLost::Accumulation);
-        }
         let mut instant = Instant {
             around: &self.around,
             extended: self.around.extended,
@@ -339,22 +367,30 @@ impl<'a> Tangents<'a> {
             before: &mut before,
             after: &mut after,
         };
-        let had_second = self.second.is_some();
+        let known = self.n_second_known();
         if is_accumulation {
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
-            self.jump(record, time, &after)?;
+            let timed = match (&time, self.second.take()) {
+                (Some(time), Some(second)) => {
+                    let mut order = instant.second_order(time, false);
+                    order.timed(&self.columns, &second)?
+                }
+                _ => None,
+            };
+            self.second_lost = SecondLost::Accumulation;
+            self.jump(record, time, timed, &mut after)?;
         } else {
             self.columns_before.clone_from(&self.columns);
-            let all = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
+            let (all, timed) = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
             if let Some(last) = all.last() {
-                self.history.push(record, &self.columns_before, &last.dt);
+                self.history
+                    .push(record, &self.columns_before, &last.dt, timed);
             }
-            if had_second && self.second.is_none() {
+            if self.n_second_known() < known {
                 let arrives = all.iter().any(|found| found.arrives);
-                self.second_lost = match (arrives, after.by_graph) {
-                    (true, _) => SecondLost::Arrival,
-                    (false, true) => SecondLost::Instant,
-                    (false, false) => SecondLost::Motion,
+                self.second_lost = match arrives {
+                    true => SecondLost::Arrival,
+                    false => SecondLost::Instant,
                 };
             }
             let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
@@ -440,7 +476,8 @@ impl Tangents<'_> {
         &mut self,
         record: &InstantRecord,
         time: Option<Row>,
-        after: &Piece,
+        timed: Option<Timed>,
+        after: &mut Piece,
     ) -> Result<(), FieldError> {
         let extended = self.around.extended;
         let (n, sizes) = (extended.n, (extended.n, extended.n_parameters()));
@@ -450,7 +487,7 @@ impl Tangents<'_> {
         let found = time.and_then(|time| {
             let dt: Vec<f64> = self.columns.iter().map(|c| dot(&time, c)).collect();
             last.dt.clone_from(&dt);
-            self.history.push(record, &self.columns, &dt);
+            self.history.push(record, &self.columns, &dt, timed);
             self.history.limit()
         });
         match found.filter(|_| self.lost.is_none()) {
@@ -465,7 +502,18 @@ impl Tangents<'_> {
                     }
                 }
                 let z = extended.state(record.x[1]);
-                after.project(record.t[1], &z, &mut self.columns)?;
+                let (t, field) = (record.t[1], record.field[1]);
+                if let Some((times, states)) = &found.second {
+                    let changes = self.columns.iter().zip(&found.dt);
+                    let changes: Vec<(f64, Moved)> = changes
+                        .map(|(column, dt)| (*dt, Moved::of_state(column).plus(*dt, field)))
+                        .collect();
+                    let mut second = behind(after, (t, &z, field), &changes, (states, times))?;
+                    second.hold(after, t, &z)?;
+                    self.second = Some(second);
+                    limit.second_dt.clone_from(times);
+                }
+                after.project(t, &z, &mut self.columns)?;
                 limit.dt = found.dt;
             }
         }

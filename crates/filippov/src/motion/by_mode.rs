@@ -122,11 +122,7 @@ impl ModeField<'_> {
         x: &[f64],
         state: &mut [f64],
     ) -> Result<f64, FieldError> {
-        let place = self.guards().iter().position(|g| *g == guard);
-        let mut value = |t: f64, x: &[f64]| -> Result<f64, FieldError> {
-            let exits = self.exits_at(t, &mut x.to_vec())?;
-            Ok(place.map_or(f64::NAN, |place| exits[place]))
-        };
+        let mut value = |t: f64, x: &[f64]| self.value_of(guard, t, x);
         let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
         let mut moved = x.to_vec();
         for (i, entry) in state.iter_mut().enumerate() {
@@ -140,6 +136,16 @@ impl ModeField<'_> {
         }
         let d = reach(t);
         Ok((value(t + d, x)? - value(t - d, x)?) / (2.0 * d))
+    }
+
+    /// The value of a guard; NaN if the motion has no such guard.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(crate) fn value_of(&mut self, guard: Guard, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+        let place = self.guards().iter().position(|g| *g == guard);
+        let exits = self.exits_at(t, &mut x.to_vec())?;
+        Ok(place.map_or(f64::NAN, |place| exits[place]))
     }
 
     /// Takes over the discrete states that an action left.

@@ -23,6 +23,8 @@ use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 pub struct MeetingFields {
     set: Vec<usize>,
     n: usize,
+    /// So many of the states are those of the model.
+    n_own: usize,
     /// Positions within the set.
     groups: Vec<Vec<usize>>,
     /// The fields of all groups, one group after the other. Pattern p of a group has sign +1 at its member b where
@@ -64,6 +66,7 @@ impl MeetingFields {
         MeetingFields {
             set: set.to_vec(),
             n,
+            n_own: system.n_own_states(),
             groups,
             fields: vec![0.0; n * rows],
             components: vec![0.0; m * rows],
@@ -285,9 +288,14 @@ impl MeetingFields {
     /// # Errors
     /// As [`normal_fields`](Self::normal_fields).
     pub fn unit_normal_fields(&self) -> Result<NormalFields, Undecided> {
-        let lengths = self.gradients.chunks_exact(self.n);
+        let lengths = (0..self.set.len()).map(|i| self.normal(i));
         let factors: Vec<f64> = lengths.map(|g| 1.0 / dot(g, g).sqrt()).collect();
         Ok(self.normal_fields()?.scaled(&factors))
+    }
+
+    /// The gradient of a switching function by the states of the model.
+    fn normal(&self, i: usize) -> &[f64] {
+        &self.gradients[i * self.n..][..self.n_own]
     }
 
     /// The largest component of all fields.
@@ -324,8 +332,7 @@ impl MeetingFields {
         let fastest =
             over_groups(&|row| square(&self.fields[row * self.n..(row + 1) * self.n]).sqrt());
         let is_telling = |&i: &usize| {
-            let gradient = &self.gradients[i * self.n..(i + 1) * self.n];
-            let size = square(gradient).sqrt() * fastest;
+            let size = square(self.normal(i)).sqrt() * fastest;
             over_groups(&|row| self.components[row * m + i].abs()) > DOUBTFUL * size
         };
         (0..m).filter(is_telling).collect()
@@ -387,7 +394,7 @@ impl MeetingFields {
     /// gradients as the rows of N and r the normal components of the combination.
     pub fn make_tangent(&self, weights: &[f64], dx: &mut [f64]) {
         let m = self.set.len();
-        let row = |i: usize| &self.gradients[i * self.n..(i + 1) * self.n];
+        let row = |i: usize| self.normal(i);
         let mut gram = Matrix::zeros(m);
         for i in 0..m {
             for j in 0..m {

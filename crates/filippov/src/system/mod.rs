@@ -87,6 +87,11 @@ pub trait PiecewiseSystem: SignStructure + Sync {
     /// Number of states.
     fn n_states(&self) -> usize;
 
+    /// How many of them are states of the model; parameters that derivatives take as states are behind them.
+    fn n_own_states(&self) -> usize {
+        self.n_states()
+    }
+
     /// Number of switching functions.
     fn n_surfaces(&self) -> usize;
 

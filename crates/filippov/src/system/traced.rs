@@ -40,6 +40,8 @@ pub struct TracedSystem {
     parameters: Vec<f64>,
     /// How many discrete states the functions read, behind the parameters.
     n_discrete: usize,
+    /// How many of its last states are parameters.
+    n_as_states: usize,
     reductions: Reductions<TracedSystem>,
 }
 
@@ -60,6 +62,7 @@ impl TracedSystem {
             model: Arc::new(model),
             parameters,
             n_discrete: 0,
+            n_as_states: 0,
             reductions: Reductions::default(),
         })
     }
@@ -100,6 +103,13 @@ impl TracedSystem {
         self
     }
 
+    /// The same system, whose last `count` states are parameters.
+    #[must_use]
+    pub(crate) fn with_parameters_as_states(mut self, count: usize) -> Self {
+        self.n_as_states = count;
+        self
+    }
+
     /// The same system with other parameter values.
     #[must_use]
     pub fn with_parameters(&self, parameters: Vec<f64>) -> Self {
@@ -107,6 +117,7 @@ impl TracedSystem {
             model: Arc::clone(&self.model),
             parameters,
             n_discrete: self.n_discrete,
+            n_as_states: self.n_as_states,
             reductions: Reductions::default(),
         }
     }
@@ -117,6 +128,7 @@ impl TracedSystem {
             model,
             parameters: self.parameters.clone(),
             n_discrete: self.n_discrete,
+            n_as_states: self.n_as_states,
             reductions: Reductions::default(),
         }
     }
@@ -266,6 +278,10 @@ fn behind(parameters: &[f64], q: &[f64]) -> SmallVec<[f64; 16]> {
 impl PiecewiseSystem for TracedSystem {
     fn n_states(&self) -> usize {
         self.model.n_states
+    }
+
+    fn n_own_states(&self) -> usize {
+        self.model.n_states - self.n_as_states
     }
 
     fn n_surfaces(&self) -> usize {
