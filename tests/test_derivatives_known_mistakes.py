@@ -75,3 +75,18 @@ def test_a_derivative_of_a_stop_is_not_zero() -> None:
     np.testing.assert_allclose(sol.derivative(), [[0.0], [0.25]], atol=1e-14)
     _, back = fl.gradient(stops, (0, 1), [1.0, 0.0], terminal=lambda t, y: y[1], wrt=["a"], **TIGHT)
     assert back["a"] == pytest.approx(0.25, abs=1e-14)
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_rest_on_a_kink_that_motions_beside_it_cross() -> None:
+    """Above x1 = 0 motions turn around the rest with the frequency sqrt(3), to the other side at a quarter."""
+    system = fl.System(lambda t, x: [x[1] + 2 * abs(x[1]), -x[0]], n=2)
+    quarter = 0.5 * np.pi / np.sqrt(3.0)
+    known = system.solve((0, 0.99 * quarter), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
+    turn = 0.99 * 0.5 * np.pi
+    exact = [[np.cos(turn), np.sqrt(3.0) * np.sin(turn)], [-np.sin(turn) / np.sqrt(3.0), np.cos(turn)]]
+    np.testing.assert_allclose(known.derivative(), exact, rtol=1e-8)
+    assert [warning.code for warning in known.warnings] == ["one_sided"]
+    lost = system.solve((0, 1.01 * quarter), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
+    assert np.isnan(lost.derivative()).all()
+    assert "stays on a surface" in lost.warnings[-1].message

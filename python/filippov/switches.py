@@ -628,6 +628,10 @@ _WHY_LOST = {
         "up to the tolerance only"
     ),
     "unsupported": "sliding of higher order, or rest, begins or ends",
+    "crossed": (
+        "the motion stays on a surface at which the field or its derivative jumps, and motions beside it "
+        "come to the other side later"
+    ),
     "not_finite": "a derivative is not finite",
 }
 

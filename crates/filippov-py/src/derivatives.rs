@@ -400,8 +400,7 @@ impl RunDerivatives {
 
     /// Where derivatives end, and why.
     pub fn lost(&self) -> Option<(f64, &'static str)> {
-        let mut instants = self.found.instants.iter();
-        instants.find_map(|found| Some((found.t, found.lost?.name())))
+        self.found.lost.map(|(t, lost)| (t, lost.name()))
     }
 
     /// The derivatives of all instants.

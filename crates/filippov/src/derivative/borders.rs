@@ -96,6 +96,53 @@ pub(super) fn surfaces_at_start(
     surfaces_with_sides(piece, at, &moved)
 }
 
+/// A surface on which a run stays by itself, as one at rest does, and the sides of it to which the columns lead: 0 if they were on it
+/// so far.
+pub(super) struct Kept {
+    surface: usize,
+    sides: Vec<f64>,
+}
+
+impl Kept {
+    /// Surfaces on which a run is, with columns of which nothing is known yet.
+    pub fn all(surfaces: &[usize], n_columns: usize) -> Vec<Kept> {
+        let own = surfaces.iter().map(|&surface| Kept {
+            surface,
+            sides: vec![0.0; n_columns],
+        });
+        own.collect()
+    }
+
+    /// Does the run stay on the surface at this place, in the same mode?
+    pub fn holds(&self, piece: &Piece, t: f64, z: &[f64]) -> Result<bool, FieldError> {
+        let place = piece.at(t, z);
+        let size = piece.extended.system.surface_size(self.surface, &place)?;
+        let h = piece.surfaces(t, z)?[self.surface];
+        Ok(h.abs() <= ROUNDING * size && piece.mode.entries()[self.surface] != 0)
+    }
+
+    /// Does one of the columns come to the other side? A run beside this one crosses the surface then.
+    pub fn is_crossed(
+        &mut self,
+        piece: &Piece,
+        (t, z): (f64, &[f64]),
+        columns: &[Vec<f64>],
+    ) -> Result<bool, FieldError> {
+        let mut normal = vec![0.0; z.len()];
+        piece.gradient(self.surface, t, z, &mut normal)?;
+        let mut is_crossed = false;
+        for (side, column) in self.sides.iter_mut().zip(columns) {
+            let terms = normal.iter().zip(column).map(|(g, v)| (g * v).abs());
+            let (size, height) = (terms.sum::<f64>(), dot(&normal, column));
+            if height.abs() > AT_SIDE * size {
+                is_crossed |= height * *side < 0.0;
+                *side = height.signum();
+            }
+        }
+        Ok(is_crossed)
+    }
+}
+
 /// Does a motion come to the surfaces slid on by another way from each corner, or leave them on one side?
 fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, FieldError> {
     Ok(!piece.sliding.is_empty() && (!piece.is_affine || piece.stays_at_an_end(t, z)?))

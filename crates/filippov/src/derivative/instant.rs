@@ -26,6 +26,8 @@ pub enum Lost {
     Accumulation,
     /// Sliding of higher order, or rest, begins or ends.
     Unsupported,
+    /// A run beside this one crosses a surface on which this one stays.
+    Crossed,
     /// A derivative is not finite.
     NotFinite,
 }
@@ -38,6 +40,7 @@ impl Lost {
             Lost::OneSided => "one-sided",
             Lost::Accumulation => "accumulation",
             Lost::Unsupported => "unsupported",
+            Lost::Crossed => "crossed",
             Lost::NotFinite => "not_finite",
         }
     }

@@ -2,7 +2,7 @@
 
 use super::borders::{
     differ, is_missed_later, starts_at_threshold, surfaces_at_start, surfaces_landed_on,
-    ticks_at_start, Borders,
+    ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -33,6 +33,8 @@ pub struct Derivatives {
     /// The mixed second derivatives at each of them, if they are followed: for every pair of columns (a, b) with b <= a, in order, those
     /// of the state. NaN where they are not known.
     pub second: Vec<f64>,
+    /// The time from which on derivatives are not known, and why.
+    pub lost: Option<(f64, Lost)>,
     /// From when on second derivatives are not known, and why.
     pub second_lost: Vec<LostSecond>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
@@ -131,6 +133,8 @@ pub struct Tangents<'a> {
     #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
+    /// Surfaces at which the sides differ, and on which the run has stayed since it came there.
+    kept_on: Vec<Kept>,
     t_start: Option<f64>,
     lost: Option<Lost>,
     found: Derivatives,
@@ -162,6 +166,7 @@ impl<'a> Tangents<'a> {
             kinds,
             pieces: Vec::new(),
             history: History::default(),
+            kept_on: Vec::new(),
             t_start: None,
             lost: None,
             found: Derivatives::default(),
@@ -220,6 +225,7 @@ impl<'a> Tangents<'a> {
             }
         }
         let borders = &mut self.found.borders;
+        self.kept_on = Kept::all(&starts_on, self.kinds.len());
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
@@ -274,8 +280,9 @@ impl<'a> Tangents<'a> {
         }
     }
 
-    fn lose(&mut self, lost: Lost) {
+    fn lose(&mut self, t: f64, lost: Lost) {
         self.lost = Some(lost);
+        self.found.lost.get_or_insert((t, lost));
         self.second = None;
         self.columns
             .iter_mut()
@@ -342,14 +349,34 @@ impl<'a> Tangents<'a> {
                 let z = extended.state(&extended.with_named(x_end, step.discrete));
                 piece.project(t1, &z, &mut self.columns)?;
             }
+            let is_crossed = self.crosses_kept(&piece, t1, x_end)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
-                self.lose(Lost::NotFinite);
+                self.lose(t1, Lost::NotFinite);
+            } else if is_crossed {
+                self.lose(t1, Lost::Crossed);
             }
         }
         self.found.borders.ends_at_instant = false;
         self.keep(t1);
         Ok(())
+    }
+
+    /// Does a run beside this one cross a surface on which this one stays?
+    fn crosses_kept(&mut self, piece: &Piece, t: f64, x: &[f64]) -> Result<bool, FieldError> {
+        if self.kept_on.is_empty() {
+            return Ok(false);
+        }
+        let z = self.around.extended.state(x);
+        let (mut kept_on, mut is_crossed) = (Vec::new(), false);
+        for mut kept in std::mem::take(&mut self.kept_on) {
+            if kept.holds(piece, t, &z)? {
+                is_crossed |= kept.is_crossed(piece, (t, &z), &self.columns)?;
+                kept_on.push(kept);
+            }
+        }
+        self.kept_on = kept_on;
+        Ok(is_crossed)
     }
 
     pub(super) fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
@@ -406,13 +433,17 @@ impl<'a> Tangents<'a> {
                 let arrives = all.iter().any(|found| found.arrives);
                 let columns = &self.columns;
                 let landed = surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
+                self.kept_on.extend(Kept::all(&landed, columns.len()));
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
             }
             let replaced = record.replaces.then_some(Lost::Accumulation);
             for mut found in all {
                 found.lost = self.lost.or(replaced).or(found.lost);
-                found.lost.into_iter().for_each(|lost| self.lose(lost));
+                found
+                    .lost
+                    .into_iter()
+                    .for_each(|lost| self.lose(found.t, lost));
                 self.keep_instant(found);
             }
         }
@@ -493,7 +524,10 @@ impl Tangents<'_> {
         match found.filter(|_| self.lost.is_none()) {
             None => {
                 limit.lost = self.lost.or(Some(Lost::Accumulation));
-                limit.lost.into_iter().for_each(|lost| self.lose(lost));
+                limit
+                    .lost
+                    .into_iter()
+                    .for_each(|lost| self.lose(limit.t, lost));
             }
             Some(found) => {
                 for ((column, dx), dt) in self.columns.iter_mut().zip(&found.dx).zip(&found.dt) {
