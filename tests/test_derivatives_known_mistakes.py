@@ -79,7 +79,7 @@ def test_a_derivative_of_a_stop_is_not_zero() -> None:
 
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_rest_on_a_kink_that_motions_beside_it_cross() -> None:
-    """Above x1 = 0 motions turn around the rest with the frequency sqrt(3), to the other side at a quarter."""
+    """Above x1 = 0 motions turn around the rest with the frequency sqrt(3), and come to the other side."""
     system = fl.System(lambda t, x: [x[1] + 2 * abs(x[1]), -x[0]], n=2)
     quarter = 0.5 * np.pi / np.sqrt(3.0)
     known = system.solve((0, 0.99 * quarter), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
