@@ -4,6 +4,8 @@
 //! and b + tau_b F- the changes of the point at which it happens, the derivatives of time and map up to second order give that of the
 //! state behind it (`docs/theory/derivatives.md`).
 
+use std::sync::Arc;
+
 use super::change::Change;
 use super::extended::{Column, Extended};
 use super::forms::{add, form_by_differences, is_known, pairs, Form, Moved, Second};
@@ -14,8 +16,6 @@ use crate::motion::Guard;
 use crate::record::InstantRecord;
 use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
-
-use std::sync::Arc;
 
 /// An instant, for second derivatives.
 pub(super) struct SecondOrder<'i, 'a> {
