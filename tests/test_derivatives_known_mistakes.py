@@ -90,3 +90,23 @@ def test_rest_on_a_kink_that_motions_beside_it_cross() -> None:
     lost = system.solve((0, 1.01 * quarter), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
     assert np.isnan(lost.derivative()).all()
     assert "stays on a surface" in lost.warnings[-1].message
+
+
+def test_an_entry_with_the_multiplier_at_its_end_beside_conditions_in_one_another() -> None:
+    """At p = 1 the field above x = 0 vanishes there: for larger p motions leave, for smaller they slide."""
+
+    def fun(t: float, x: Any, p: float) -> Any:
+        if x[0] > -0.674:
+            push = 0.0
+        elif x[0] > -0.4:
+            push = 1.0
+        else:
+            push = -0.4
+        return [-0.3 * x[0] + p - 0.9 * push - np.sign(x[0])]
+
+    system = fl.System(fun, n=1, params={"p": 1.0})
+    with pytest.warns(fl.FilippovWarning, match="derivatives are not known"):
+        sol = system.solve((0, 2), [-1.0], wrt=["p"])
+    assert sol.switches[-1].kind == "enter_sliding"
+    assert sol.switches[-1].derivative.lost == "one-sided"
+    assert np.isnan(sol.derivative()).all()

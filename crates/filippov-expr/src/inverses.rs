@@ -6,7 +6,7 @@
 //! | term | beside c | compared instead |
 //! |---|---|---|
 //! | `cbrt(u)` | anything | u and c^3 |
-//! | `sqrt(u)` | a number, what no motion changes, or of known sign; anything, if u has a kink | u and c \|c\| |
+//! | `sqrt(u)` | a number, what no motion changes, or of known sign; anything, if u is a cube root | u and c \|c\| |
 //! | `u**p` | the same | u and the power 1/p of \|c\|, with the sign of c |
 //! | `log(u)` | the same | u and exp(c) |
 //!
@@ -157,14 +157,14 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
             // A power above 1 is smooth enough, and its inverse a root.
             None if p < 1.0 && graph.facts(sum).varies => return None,
             None => {
-                let has_kink = graph.facts(term.argument).has_sign;
-                odd_power(graph, &rest, sum, p, has_kink)?
+                let below = graph.all_below(&[term.argument]);
+                let is_cube =
+                    |id: &NodeId| matches!(graph.node(*id), Node::Unary(UnaryOp::Cbrt, _));
+                let is_steep = below.iter().any(is_cube);
+                odd_power(graph, &rest, sum, p, is_steep)?
             }
         },
         Inverse::Exponential(base) => {
-            if graph.facts(sum).has_sign {
-                return None;
-            }
             let exponent = graph.constant(-base.ln());
             let exponent = graph.mul(exponent, sum);
             let power = graph.unary(UnaryOp::Exp, exponent);
@@ -213,13 +213,13 @@ fn power_of_root(graph: &mut Graph, form: &LinearForm, p: f64) -> Option<NodeId>
     })
 }
 
-/// |c|^p with the sign of c; `None` if that may have a kink along a motion, unless kinks are made surfaces.
+/// |c|^p with the sign of c; `None` if that may have a kink along a motion, unless its sign may be a surface of its own.
 fn odd_power(
     graph: &mut Graph,
     form: &LinearForm,
     c: NodeId,
     p: f64,
-    has_kinks: bool,
+    may_switch: bool,
 ) -> Option<NodeId> {
     if let Some(value) = graph.as_constant(c) {
         return Some(graph.constant(value.abs().powf(p).copysign(value)));
@@ -246,7 +246,7 @@ fn odd_power(
     }
     // What no motion changes needs no surface for its sign, nor does what jumps only.
     let is_fixed = !graph.facts(c).varies || graph.is_stepwise(c);
-    if p <= 1.0 || !is_fixed && !has_kinks {
+    if p <= 1.0 || !is_fixed && !may_switch {
         return None;
     }
     let magnitude = match is_fixed {

@@ -67,8 +67,8 @@ pub struct Located {
 /// digits), then secant steps, kept in the bracket; a bisection whenever a step does not halve the one
 /// before. A secant step errs by its length times the relative error of its slope, for which the change
 /// of the slope stands, and at least the length in units of the bracket: if that is below half the
-/// `width` the end of the step is the zero and is not evaluated. Otherwise returns the evaluated point
-/// with the smallest |g|.
+/// `width` the end of the step is the zero and is not evaluated. Otherwise returns the end of the last
+/// bracket with the smaller |g|: beside a jump, points far from it may have as small values.
 ///
 /// # Errors
 /// If `g` raises.
@@ -76,30 +76,23 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
     let Bracket {
         mut lo,
         mut hi,
-        g_lo,
-        g_hi,
+        mut g_lo,
+        mut g_hi,
         guess,
         mut slope,
     } = bracket;
-    let mut best = match g_lo.abs() < g_hi.abs() {
-        true => (lo, g_lo),
-        false => (hi, g_hi),
-    };
     let mut previous = None;
     let mut at = guess.clamp(lo, hi);
     let length = hi - lo;
     let mut last_move = length;
     let mut steepest = slope.abs();
-    while best.1 != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
+    while g_lo != 0.0 && g_hi != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
         let value = g(at)?;
-        if value.abs() < best.1.abs() {
-            best = (at, value);
-        }
         // The function falls through zero: positive to the left.
         if value > 0.0 {
-            lo = at;
+            (lo, g_lo) = (at, value);
         } else {
-            hi = at;
+            (hi, g_hi) = (at, value);
         }
         let chord = previous.map_or(slope, |(x, v)| (value - v) / (at - x));
         steepest = chord.abs().max(slope.abs());
@@ -126,9 +119,13 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         (previous, slope) = (Some((at, value)), chord);
         at = next;
     }
+    let (theta, value) = match g_lo.abs() < g_hi.abs() {
+        true => (lo, g_lo),
+        false => (hi, g_hi),
+    };
     Ok(Located {
-        theta: best.0,
-        residual: best.1.abs(),
+        theta,
+        residual: value.abs(),
         slope: steepest,
     })
 }

@@ -92,21 +92,24 @@ fn roots_that_may_end_and_powers_beside_powers_are_left() {
 }
 
 #[test]
-fn a_root_of_a_kink_beside_what_varies_switches_as_a_square() {
+fn a_root_of_a_cube_root_beside_what_varies_switches_without_roots() {
     let mut g = Graph::new();
     let (x, y) = (g.state(0), g.state(1));
-    let size = g.abs(x);
+    let cube = root(&mut g, UnaryOp::Cbrt, x);
+    let size = g.abs(cube);
     let sqrt = root(&mut g, UnaryOp::Sqrt, size);
     let beside = g.sub(sqrt, y);
-    assert_eq!(surface(&mut g, beside).0, "abs(x[0]) - sign(x[1])*x[1]**2");
-    // A root without a kink keeps what has none.
-    let squares = {
-        let (xx, yy) = (g.mul(x, x), g.mul(y, y));
-        g.add(xx, yy)
-    };
-    let sqrt = root(&mut g, UnaryOp::Sqrt, squares);
+    let (text, _) = surface(&mut g, beside);
+    assert!(!text.contains("sqrt") && !text.contains("cbrt"), "{text}");
+    // A root that no cube root is in needs no surface at y = 0.
+    let plain = g.abs(x);
+    let sqrt = root(&mut g, UnaryOp::Sqrt, plain);
     let beside = g.sub(sqrt, y);
     assert!(surface(&mut g, beside).0.contains("sqrt"));
+    // What is nowhere negative needs none either.
+    let size = g.abs(y);
+    let beside = g.sub(sqrt, size);
+    assert_eq!(surface(&mut g, beside).0, "abs(x[0]) - x[1]**2");
 }
 
 #[test]

@@ -152,11 +152,13 @@ impl Instant<'_, '_> {
         if passage.goes_on {
             return Ok(Ok(passage));
         }
+        let mut sliding = self.after.sliding.iter();
+        let enters = record.acts.is_empty() && sliding.any(|j| !self.before.sliding.contains(j));
+        let z = self.extended.state(record.x[1]);
+        if enters && self.after.stays_at_an_end(record.t[1], &z)? {
+            return Ok(Err(Lost::OneSided));
+        }
         if let Some(entry) = self.entry()? {
-            let z = self.extended.state(record.x[1]);
-            if self.after.stays_at_an_end(record.t[1], &z)? {
-                return Ok(Err(Lost::OneSided));
-            }
             passage.changes.push(entry);
             return Ok(Ok(passage));
         }
@@ -171,7 +173,6 @@ impl Instant<'_, '_> {
             .for_each(|(f, after)| *f -= after);
         let jump = Change::at_moving_time(map, moved, passage.time.clone());
         passage.changes.push(jump);
-        let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
         let arrival = match record.acts.is_empty() {
             true => None,
