@@ -68,16 +68,3 @@ def test_a_section_with_a_floor_of_its_own_is_said_to_be_sampled() -> None:
     system = fl.System(oscillator, n=2)
     with pytest.warns(fl.FilippovWarning, match="is sampled"):
         fl.poincare(system, lambda t, x: np.floor(3 * x[0]) - 0.5, (0, 10), [1.0, 0.0])
-
-
-@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
-def test_a_jump_is_located_where_it_is() -> None:
-    """Both sides of the jump are as far from zero as points beside it."""
-    sol = fl.solve_ivp(
-        lambda t, x: [1.0],
-        (0, 4),
-        [0.0],
-        method="DOPRI5",
-        events=lambda t, x: 0.25 * np.floor(4 * (0.25 * np.floor(4 * min(x[0], 2.2 * x[0])))) - 0.52,
-    )
-    np.testing.assert_allclose(sol.t_events[0], [0.75], rtol=0, atol=1e-9)

@@ -3,7 +3,7 @@
 use super::certificate::Bound;
 use super::filter::may_vanish;
 use super::isolate::{first_zero, Evidence, Zero, PROBES};
-use crate::locate::refine;
+use crate::locate::{refine, Bracket};
 use filippov_expr::Interval;
 use proptest::prelude::*;
 
@@ -30,6 +30,21 @@ fn a_double_crossing_inside_is_found() {
             .theta;
         assert!((zero - 0.4).abs() < 1e-9, "gap {gap}: {zero}");
     }
+}
+
+#[test]
+fn a_jump_is_located_among_points_that_are_as_near_to_zero() {
+    let mut g = |x: f64| Ok(if x < 0.6 { 0.02 } else { -0.23 });
+    let bracket = Bracket {
+        lo: 0.5,
+        hi: 0.75,
+        g_lo: 0.02,
+        g_hi: -0.23,
+        guess: 0.53,
+        slope: -1.0,
+    };
+    let zero = refine(&mut g, bracket, 1e-15).unwrap();
+    assert!((zero.theta - 0.6).abs() < 1e-14, "{zero:?}");
 }
 
 #[test]
