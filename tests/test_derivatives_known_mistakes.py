@@ -110,3 +110,28 @@ def test_an_entry_with_the_multiplier_at_its_end_beside_conditions_in_one_anothe
     assert sol.switches[-1].kind == "enter_sliding"
     assert sol.switches[-1].derivative.lost == "one-sided"
     assert np.isnan(sol.derivative()).all()
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_a_kink_under_the_whole_run_that_does_not_bend_at_the_start() -> None:
+    """abs(x0) counts as soon as x1 differs from 0: derivatives by x0 are those of one side."""
+    system = fl.System(lambda t, x, a=0.5: [-0.1 * x[0], 1.0 + a * abs(x[0]) * x[1]], n=2)
+    sol = system.solve((0, 1), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
+    assert [warning.code for warning in sol.warnings] == ["one_sided"]
+    sides = [(system.solve((0, 1), [d, 0.0], rtol=1e-12).y[1, -1] - 1.0) / d for d in (1e-6, -1e-6)]
+    assert abs(sides[0] + sides[1]) < 1e-5
+    assert min(abs(sol.derivative()[1, 0] - side) for side in sides) < 1e-5
+    # By the parameter the run stays on the surface.
+    assert not system.solve((0, 1), [0.0, 0.0], wrt=["a"]).warnings
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_a_touch_at_which_the_function_is_stationary_in_time() -> None:
+    """cos(t) touches -p at t = pi for p = 1: for a smaller p the field jumps for a time like a root."""
+    system = fl.System(lambda t, x, p: [1.0 * (np.cos(t) < -p)], n=1, params={"p": 1.0})
+    sol = system.solve((0, 5), [0.0], wrt=["y0", "p"])
+    assert np.isnan(sol.derivative()).all()
+    assert sol.warnings[-1].code == "no_derivative"
+    start = system.solve((0, 5), [0.0], wrt="y0")
+    assert not start.warnings
+    np.testing.assert_array_equal(start.derivative(), [[1.0]])

@@ -355,7 +355,7 @@ impl<'w> Walk<'w> {
             }
             let borders = &mut found.borders;
             let at = (start.t, &z[..]);
-            borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?;
+            borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?.0;
             borders.starts_at_threshold = starts_at_threshold(&piece, at, kinds)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
             found.by_start = -dot(&found.by_state, &field);

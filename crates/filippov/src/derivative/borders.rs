@@ -67,7 +67,7 @@ pub(super) fn surfaces_landed_on(
         (dt, place)
     };
     let moved: Vec<_> = dt.iter().zip(columns).map(moved).collect();
-    let mut found = surfaces_with_sides(piece, (t, &z), &moved)?;
+    let mut found = surfaces_with_sides(piece, (t, &z), &moved)?.0;
     if arrives && slides_by_sides(piece, (t, &z))? {
         found.extend_from_slice(&piece.sliding);
         found.sort_unstable();
@@ -81,13 +81,14 @@ pub(super) fn surfaces_landed_on(
     Ok(found)
 }
 
-/// The surfaces through a start at which the sides differ for one of these columns, as they are before the motion acts on them.
+/// The surfaces through a start at which the sides differ for one of these columns, as they are before the motion acts on them, and
+/// those at which they do not yet, and on which the motion stays.
 pub(super) fn surfaces_at_start(
     piece: &mut Piece,
     at: (f64, &[f64]),
     kinds: &[Column],
     columns: &[Vec<f64>],
-) -> Result<Vec<usize>, FieldError> {
+) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
     let later = |kind: &Column| f64::from(*kind == Column::Start);
     let moved = kinds.iter().zip(columns);
     let moved: Vec<_> = moved
@@ -101,16 +102,34 @@ pub(super) fn surfaces_at_start(
 pub(super) struct Kept {
     surface: usize,
     sides: Vec<f64>,
+    /// Do the sides differ? On a kink they may do so later only.
+    has_sides: bool,
 }
 
 impl Kept {
     /// Surfaces on which a run is, with columns of which nothing is known yet.
-    pub fn all(surfaces: &[usize], n_columns: usize) -> Vec<Kept> {
+    pub fn all(surfaces: &[usize], n_columns: usize, has_sides: bool) -> Vec<Kept> {
         let own = surfaces.iter().map(|&surface| Kept {
             surface,
             sides: vec![0.0; n_columns],
+            has_sides,
         });
         own.collect()
+    }
+
+    /// The surface, if its sides differ from here on for one of the columns.
+    pub fn begins_to_differ(
+        &mut self,
+        piece: &Piece,
+        (t, z): (f64, &[f64]),
+    ) -> Result<Option<usize>, FieldError> {
+        if self.has_sides || self.sides.iter().all(|side| *side == 0.0) {
+            return Ok(None);
+        }
+        let mut normal = vec![0.0; z.len()];
+        piece.gradient(self.surface, t, z, &mut normal)?;
+        self.has_sides = bends_across(piece, self.surface, (t, z), &normal)?;
+        Ok(self.has_sides.then_some(self.surface))
     }
 
     /// Does the run stay on the surface at this place, in the same mode?
@@ -139,7 +158,7 @@ impl Kept {
                 *side = height.signum();
             }
         }
-        Ok(is_crossed)
+        Ok(is_crossed && self.has_sides)
     }
 }
 
@@ -150,16 +169,16 @@ fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, Fie
 
 /// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces
 /// that the motion leaves where the field jumps, or does not leave where its derivative jumps; those that it slides on, if the way there
-/// has sides; and those at which another one of them has a kink.
+/// has sides; and those at which another one of them has a kink. Behind them those that it does not leave and that have no sides here.
 fn surfaces_with_sides(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
     changes: &[(f64, Vec<f64>)],
-) -> Result<Vec<usize>, FieldError> {
+) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
     let h = piece.surfaces(t, z)?;
     let field = piece.rates(t, z)?;
     let slides_by_sides = slides_by_sides(piece, (t, z))?;
-    let (mut found, mut others) = (Vec::new(), Vec::new());
+    let (mut found, mut others, mut kept) = (Vec::new(), Vec::new(), Vec::new());
     for (j, h) in h.iter().enumerate() {
         let size = {
             let place = piece.at(t, z);
@@ -182,9 +201,11 @@ fn surfaces_with_sides(
             0 => piece.sliding.contains(&j) && slides_by_sides,
             _ => {
                 let system = &piece.extended.system;
-                system.jumps_across(j, &piece.signs, &piece.sliding)
-                    || (is_kept(piece, j, (t, z), (by_time, &normal), &field)?
-                        && bends_across(piece, j, (t, z), &normal)?)
+                let jumps = system.jumps_across(j, &piece.signs, &piece.sliding);
+                let is_kept = !jumps && is_kept(piece, j, (t, z), (by_time, &normal), &field)?;
+                let bends = is_kept && bends_across(piece, j, (t, z), &normal)?;
+                kept.extend((is_kept && !bends).then_some(j));
+                jumps || bends
             }
         };
         match has_sides {
@@ -208,7 +229,7 @@ fn surfaces_with_sides(
         }
     }
     all.sort_unstable();
-    Ok(all)
+    Ok((all, kept))
 }
 
 /// Does a motion with this velocity stay on a surface, as far as the first two derivatives say?

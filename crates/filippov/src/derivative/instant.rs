@@ -215,7 +215,12 @@ impl Instant<'_, '_> {
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
         let most = if touches { AT_SIDE } else { ROUNDING };
         let is_regular = *condition < 1.0 / most && rate != 0.0;
-        if !is_regular {
+        // A touch at which the function is stationary, as cos(x) - p is at p = 1, is moved by the parameters alone.
+        let by_parameters = timing.state[self.extended.n..].iter();
+        let values = self.extended.values.iter().map(|p| 1.0 + p.abs());
+        let moved = by_parameters.zip(values).map(|(g, p)| (g * p).abs());
+        let is_moved = touches && moved.sum::<f64>() * AT_SIDE > rate.abs() * weights.span;
+        if !is_regular || is_moved {
             return Ok(Err(Lost::Grazing));
         }
         Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))

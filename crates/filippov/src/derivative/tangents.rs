@@ -211,7 +211,8 @@ impl<'a> Tangents<'a> {
             self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
         }
         self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
-        let starts_on = surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
+        let (starts_on, stays_on) =
+            surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
             let mut beside = Beside::new();
             for (c, column) in self.columns.iter_mut().enumerate() {
@@ -225,7 +226,9 @@ impl<'a> Tangents<'a> {
             }
         }
         let borders = &mut self.found.borders;
-        self.kept_on = Kept::all(&starts_on, self.kinds.len());
+        self.kept_on = Kept::all(&starts_on, self.kinds.len(), true);
+        let quiet = Kept::all(&stays_on, self.kinds.len(), false);
+        self.kept_on.extend(quiet);
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
@@ -372,6 +375,8 @@ impl<'a> Tangents<'a> {
         for mut kept in std::mem::take(&mut self.kept_on) {
             if kept.holds(piece, t, &z)? {
                 is_crossed |= kept.is_crossed(piece, (t, &z), &self.columns)?;
+                let differs = kept.begins_to_differ(piece, (t, &z))?;
+                self.found.borders.starts_on.extend(differs);
                 kept_on.push(kept);
             }
         }
@@ -433,7 +438,7 @@ impl<'a> Tangents<'a> {
                 let arrives = all.iter().any(|found| found.arrives);
                 let columns = &self.columns;
                 let landed = surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
-                self.kept_on.extend(Kept::all(&landed, columns.len()));
+                self.kept_on.extend(Kept::all(&landed, columns.len(), true));
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
             }
