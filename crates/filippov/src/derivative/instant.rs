@@ -149,6 +149,9 @@ impl Instant<'_, '_> {
             n_recorded: 0,
             arrives: false,
         };
+        if self.leaves_at_two_fold() {
+            return Ok(Err(Lost::Grazing));
+        }
         if passage.goes_on {
             return Ok(Ok(passage));
         }
@@ -262,6 +265,18 @@ impl Instant<'_, '_> {
                 record.mode[1].entries()[surface] != 0 && same(Some(surface))
             }
             [Guard::Surface(_)] => same(None) && record.field[0] == record.field[1],
+            _ => false,
+        }
+    }
+
+    /// Does sliding on one surface end on the other side than its multiplier tells? So it is where the fields of both sides become
+    /// tangent to the surface.
+    fn leaves_at_two_fold(&self) -> bool {
+        let record = self.record;
+        match (record.guards, &self.before.sliding[..]) {
+            (&[Guard::Multiplier { surface, end }], [_]) => {
+                record.acts.is_empty() && record.mode[1].entries()[surface] == -end
+            }
             _ => false,
         }
     }
