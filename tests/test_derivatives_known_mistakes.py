@@ -135,3 +135,20 @@ def test_a_touch_at_which_the_function_is_stationary_in_time() -> None:
     start = system.solve((0, 5), [0.0], wrt="y0")
     assert not start.warnings
     np.testing.assert_array_equal(start.derivative(), [[1.0]])
+
+
+def test_sliding_that_ends_at_a_two_fold() -> None:
+    """The jump vanishes with arctan(x3 - x0): the multiplier is -0.32 there, and the motion leaves below."""
+
+    def fun(t: float, x: Any, p: float) -> Any:
+        side = np.sign(0.37 * x[2] - 0.86 * x[0] - p)
+        bend = -0.92 * x[2] - 0.5 * x[3] - 0.2 * x[2] ** 3 - 0.68 * side * np.arctan(x[3] - x[0])
+        return [-0.5 * x[0], -0.5 * x[1], bend, -0.693 * x[3] - x[0] / (1 + x[2] ** 2) + 1.2 * side]
+
+    system = fl.System(fun, n=4, params={"p": 0.06})
+    with pytest.warns(fl.FilippovWarning, match="the fields of both sides are tangent"):
+        sol = system.solve((0, 5), [-1.2, -0.82, 0.379, -0.6], wrt=["p"], rtol=1e-10, atol=1e-10)
+    assert [switch.kind for switch in sol.switches] == ["enter_sliding", "exit_sliding"]
+    assert sol.sol.multipliers(sol.switches.t[1] - 1e-6)[0] == pytest.approx(-0.3223, abs=1e-3)
+    assert sol.switches[1].derivative.lost == "grazing"
+    assert np.isnan(sol.derivative()).all()

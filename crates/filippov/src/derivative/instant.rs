@@ -103,18 +103,12 @@ pub(super) struct Passage {
 impl Passage {
     /// What becomes of changes of the extended state. Returns those that actions put beside the surfaces slid on.
     pub fn apply(&self, n: usize, columns: &mut [Vec<f64>]) -> Beside {
-        let first = self.changes.len() - usize::from(self.arrives);
-        let mut beside = Beside::new();
-        for (c, column) in columns.iter_mut().enumerate() {
-            let own = &self.changes[..first];
+        let own = &self.changes[..self.changes.len() - usize::from(self.arrives)];
+        for column in &mut *columns {
             own.iter().for_each(|change| change.apply(n, column));
-            if let Some(arrival) = self.arrival() {
-                let before = column.clone();
-                arrival.apply(n, column);
-                beside.extend(differ(&before, column).then_some(c));
-            }
         }
-        beside
+        let arrival = self.arrival();
+        arrival.map_or_else(Beside::new, |arrival| brought_by(arrival, n, columns))
     }
 
     /// What brings a state that actions put beside the surfaces slid on to them.
@@ -387,6 +381,17 @@ pub(super) fn arrival(piece: &Piece, t: f64, z: &[f64]) -> Result<Option<Change>
         None => piece.projection(&[], t, z),
         entry => Ok(entry),
     }
+}
+
+/// Brings changes to the surfaces slid on. Returns those that were beside them.
+pub(super) fn brought_by(arrival: &Change, n: usize, columns: &mut [Vec<f64>]) -> Beside {
+    let mut beside = Beside::new();
+    for (c, column) in columns.iter_mut().enumerate() {
+        let before = column.clone();
+        arrival.apply(n, column);
+        beside.extend(differ(&before, column).then_some(c));
+    }
+    beside
 }
 
 /// Surfaces with the jumps of the field there.

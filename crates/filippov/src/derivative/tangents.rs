@@ -7,7 +7,7 @@ use super::borders::{
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Moved, Second};
-use super::instant::{arrival, Beside, Instant, Lost, Weights};
+use super::instant::{arrival, brought_by, Instant, Lost, Weights};
 use super::limit::History;
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
@@ -214,12 +214,7 @@ impl<'a> Tangents<'a> {
         let (starts_on, stays_on) =
             surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
-            let mut beside = Beside::new();
-            for (c, column) in self.columns.iter_mut().enumerate() {
-                let before = column.clone();
-                arrival.apply(n, column);
-                beside.extend(differ(&before, column).then_some(c));
-            }
+            let beside = brought_by(&arrival, n, &mut self.columns);
             if let Some(second) = &mut self.second {
                 self.second_lost = SecondLost::Start;
                 second.arrive((&piece, &arrival), (t, &z), &self.columns, &beside)?;
@@ -341,11 +336,12 @@ impl<'a> Tangents<'a> {
             };
             if let Some(second) = &mut self.second {
                 let known = second.n_known();
-                let goes_on = piece.advance_pairs(along, (t0, t1), &self.columns, second)?;
-                if !goes_on || second.n_known() < known {
+                let columns = &self.columns;
+                let is_carried = piece.advance_pairs(along, (t0, t1), columns, second)?;
+                if !is_carried || second.n_known() < known {
                     self.second_lost = SecondLost::Motion;
                 }
-                self.second = self.second.take().filter(|_| goes_on);
+                self.second = self.second.take().filter(|_| is_carried);
             }
             piece.advance(along, (t0, t1), &mut self.columns)?;
             if piece.codimension() > 0 {
