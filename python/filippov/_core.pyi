@@ -326,7 +326,8 @@ class HeldMotions:
         x: _Array,
         t1: float,
         places: int = 0,
-    ) -> tuple[_Array, _Array, list[_Array], _Array, _Array]: ...
+        ending: int | None = None,
+    ) -> tuple[_Array, _Array, list[_Array], _Array, _Array, tuple[float, _Array] | None]: ...
     def guards(self, mode: Sequence[int], q: Sequence[float]) -> list[_Guard]: ...
     def at(
         self, mode: Sequence[int], q: Sequence[float], t: float, x: _Array

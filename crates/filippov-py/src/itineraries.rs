@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::derivative::{Extended, Extension, HeldMotion};
 use filippov::motion::{Guard, RootEnd};
-use filippov::{leg, InstantRecord, LegError, Mode, Options, Over, Reached, Stop};
+use filippov::{leg, Gradient, InstantRecord, LegError, Mode, Options, Over, Reached, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -61,6 +61,10 @@ pub fn instant_row<'py>(py: Python<'py>, record: &InstantRecord) -> InstantRow<'
     )
 }
 
+fn by_time_and_state(gradient: &Gradient) -> Vec<f64> {
+    [&[gradient.time], &gradient.state[..]].concat()
+}
+
 /// The motions of a system with these parameters, held in any mode.
 #[pyclass(frozen, module = "filippov._core")]
 pub struct HeldMotions {
@@ -93,10 +97,11 @@ impl HeldMotions {
         })
     }
 
-    /// The motion over a time: the state at its end, its derivative by states and parameters, the velocities at both ends, and
-    /// times with the values of the guards there.
+    /// The motion over a time: the state at its end; its derivative by the states and the time at its start, its duration and the
+    /// parameters; the velocities at both ends; times with the values of the guards there; and the guard of a number at its end,
+    /// with its derivatives by the time, the states and the parameters.
     #[allow(clippy::type_complexity, clippy::too_many_arguments)]
-    #[pyo3(signature = (mode, q, t0, x, t1, places=0))]
+    #[pyo3(signature = (mode, q, t0, x, t1, places=0, ending=None))]
     fn leg<'py>(
         &self,
         py: Python<'py>,
@@ -106,12 +111,14 @@ impl HeldMotions {
         x: Given<'_>,
         t1: f64,
         places: usize,
+        ending: Option<usize>,
     ) -> PyResult<(
         Vector<'py>,
         Rows<'py>,
         [Vector<'py>; 2],
         Vector<'py>,
         Rows<'py>,
+        Option<(f64, Vector<'py>)>,
     )> {
         let (mode, x) = (Mode::new(mode), x.as_slice()?.to_vec());
         let found = self.with(&q, |system, extended, actions| {
@@ -119,6 +126,7 @@ impl HeldMotions {
                 span: (t0, t1),
                 start: &x,
                 places,
+                ending,
             };
             let of = (system, extended, actions);
             let mut interrupt = |_: Reached| {
@@ -141,8 +149,17 @@ impl HeldMotions {
             let message = found.stop.message(t0, &mode, name);
             return Err(PyValueError::new_err(message));
         }
-        let (n, m) = (x.len(), found.derivative.len() / x.len());
-        let row = |r: usize| (0..m).map(|c| found.derivative[c * n + r]).collect();
+        let n = x.len();
+        let (by_state, by_parameters) = found.derivative.split_at(n * n);
+        let [at_start, at_end] = &found.velocities;
+        // The motion that starts later starts farther back.
+        let back = |r: usize| (0..n).map(|c| by_state[c * n + r] * at_start[c]).sum::<f64>();
+        let row = |r: usize| {
+            let entries = |columns: &[f64]| columns.iter().skip(r).step_by(n).copied().collect();
+            let (states, parameters): (Vec<f64>, Vec<f64>) =
+                (entries(by_state), entries(by_parameters));
+            [&states[..], &[at_end[r] - back(r), at_end[r]], &parameters].concat()
+        };
         let derivative: Vec<Vec<f64>> = (0..n).map(row).collect();
         let times: Vec<f64> = found.samples.iter().map(|sample| sample.0).collect();
         let width = found.samples.first().map_or(0, |sample| sample.1.len());
@@ -157,6 +174,10 @@ impl HeldMotions {
             found.velocities.map(|v| PyArray1::from_slice(py, &v)),
             PyArray1::from_slice(py, &times),
             columns(py, &values, width),
+            found.ending.map(|guard| {
+                let row = by_time_and_state(&guard.gradient);
+                (guard.value, PyArray1::from_vec(py, row))
+            }),
         ))
     }
 
@@ -188,10 +209,7 @@ impl HeldMotions {
             let multipliers = motion.multipliers();
             let found = motion.guards_at(t, &x).map_err(raised)?;
             let values: Vec<f64> = found.iter().map(|guard| guard.value).collect();
-            let rows = found.iter().map(|guard| {
-                let gradient = &guard.gradient;
-                [&[gradient.time], &gradient.state[..]].concat()
-            });
+            let rows = found.iter().map(|guard| by_time_and_state(&guard.gradient));
             let rows: Vec<Vec<f64>> = rows.collect();
             let gradients = match rows.is_empty() {
                 true => PyArray2::zeros(py, [0, 1 + velocity.len()], false),
@@ -230,8 +248,7 @@ impl HeldMotions {
             let found = found.map_err(raised)?;
             let rows = found.rows.map(|rows| PyArray2::from_vec2(py, &rows));
             let clock = found.clock.map(|(value, gradient)| {
-                let row = [&[gradient.time], &gradient.state[..]].concat();
-                (value, PyArray1::from_slice(py, &row))
+                (value, PyArray1::from_vec(py, by_time_and_state(&gradient)))
             });
             Ok((
                 PyArray1::from_slice(py, &found.x),

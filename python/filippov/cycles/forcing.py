@@ -234,8 +234,14 @@ def _refined(motions: Motions, guess: float) -> float:
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    left = np.max(np.abs(_difference(motions, period, _CONFIRMED_AT)), initial=0.0)
-    return bool(left <= 1e-11 * _size(motions, _CONFIRMED_AT))
+    places = _samples(motions)[:_CONFIRMED_AT]
+    now, later = (
+        np.concatenate([motions.right_hand_side(u * period + wait, x, signs) for u, x, signs in places])
+        for wait in (0.0, period)
+    )
+    left = np.abs(later - now)
+    size = np.max(np.abs(now), initial=1.0, where=np.isfinite(now))
+    return bool(np.max(left, initial=0.0, where=np.isfinite(left)) <= 1e-11 * size)
 
 
 def _size(motions: Motions, count: int = _PLACES) -> float:

@@ -48,20 +48,27 @@ class LegEnd(NamedTuple):
     ----------
     x : ndarray, shape (n,)
         The state at the end.
-    by_state, by_parameters : ndarray, shape (n, n) and (n, k)
-        Its derivatives.
+    derivatives : ndarray, shape (n, n + 2 + k)
+        Its derivatives by the state and the time at the start, by the duration and by the parameters.
     velocities : (ndarray, ndarray)
         The velocities at both ends.
     times, guards : ndarray, shape (m,) and (g, m)
         Places on the way, and the values of the guards there.
+    ending : (float, ndarray of shape (1 + n + k,)) or None
+        The guard asked for at the end, and its derivatives by the time, the state and the parameters.
     """
 
     x: Array
-    by_state: Array
-    by_parameters: Array
+    derivatives: Array
     velocities: tuple[Array, Array]
     times: Array
     guards: Array
+    ending: tuple[float, Array] | None
+
+    @property
+    def by_state(self) -> Array:
+        """The derivative by the state at the start, (n, n)."""
+        return self.derivatives[:, : len(self.x)]
 
 
 class GuardsAt(NamedTuple):
@@ -164,7 +171,7 @@ class Motions:
         self.options = {**_DEFAULTS, **options}
         self._checked: Options = check_options(self.options, (0.0, 1.0), n)
         self._by = tuple(by)
-        self._held: tuple[Array, HeldMotions] | None = None
+        self._held: HeldMotions | None = None
         # Those of all runs; copies add to the same list.
         self.warnings: list[RunWarning] = []
         # What is computed, in a bar for each long run; none if it is empty.
@@ -204,8 +211,8 @@ class Motions:
         prepared = self.system.prepare(self.n, 0.0, None, values)
         refuse_without_derivatives(prepared, (0.0, 1.0))
         assert isinstance(prepared.core, TracedSystem)
-        self._params, self._prepared, self._core = values, prepared, prepared.core
-        self._held = None
+        self._prepared, self._core = prepared, prepared.core
+        self._take(values)
 
     def move(self, values: Array) -> None:
         """Take other values of the parameters by which derivatives are taken."""
@@ -214,7 +221,12 @@ class Motions:
             return
         if self._prepared.pinned is not None:
             self.use(moved)
-        self._params, self._held = moved, None
+        self._take(moved)
+
+    def _take(self, params: dict[str, float]) -> None:
+        self._params, self._vector = params, parameter_vector(params)
+        self._held = None
+        self._guards: dict[tuple[Mode, tuple[float, ...]], list[Guard]] = {}
 
     def copy(self) -> Motions:
         """Return a copy with its own parameters."""
@@ -229,9 +241,16 @@ class Motions:
         return other
 
     def leg(
-        self, mode: Mode, q: tuple[float, ...], t0: float, x: Array, duration: float, places: int = 0
+        self,
+        mode: Mode,
+        q: tuple[float, ...],
+        t0: float,
+        x: Array,
+        duration: float,
+        places: int = 0,
+        guard: Guard | None = None,
     ) -> LegEnd:
-        """Follow the motion in a mode for some time, at least a rounding of it.
+        """Follow the motion in a mode for some time, at least a rounding of it, maybe to a guard.
 
         Raises
         ------
@@ -239,18 +258,19 @@ class Motions:
             If the motion cannot be followed so far.
         """
         last = max(t0 + duration, np.nextafter(t0, np.inf))
+        ending = None if guard is None else self.guards(mode, q).index(guard)
         try:
-            end, derivative, velocities, times, guards = self._motions().leg(
-                mode, q, t0, _contiguous(x), last, places
-            )
+            found = self._motions().leg(mode, q, t0, _contiguous(x), last, places, ending)
         except ValueError as error:
             raise ModelError(f"in mode {mode} from t = {t0:.6g}: {error}") from None
-        by_state, by_parameters = derivative[:, : self.n], derivative[:, self.n :]
-        return LegEnd(end, by_state, by_parameters, (velocities[0], velocities[1]), times, guards)
+        end, derivatives, (at_start, at_end), times, guards, at_guard = found
+        return LegEnd(end, derivatives, (at_start, at_end), times, guards, at_guard)
 
     def guards(self, mode: Mode, q: tuple[float, ...]) -> list[Guard]:
         """Return what ends the motion in a mode."""
-        return self._motions().guards(mode, q)
+        if (mode, q) not in self._guards:
+            self._guards[mode, q] = self._motions().guards(mode, q)
+        return self._guards[mode, q]
 
     def at(self, mode: Mode, q: tuple[float, ...], t: float, x: Array) -> GuardsAt:
         """Return the guards of a motion at a place."""
@@ -304,20 +324,16 @@ class Motions:
 
     def right_hand_side(self, t: float, x: Array, signs: Array) -> Array:
         """Return the field and the switching functions at a place, with these signs."""
-        p = parameter_vector(self._params)
-        field = self._core.field(t, x, signs, p)
-        return np.concatenate([field, self._core.surface_values(t, x, signs, p)])
+        field = self._core.field(t, x, signs, self._vector)
+        return np.concatenate([field, self._core.surface_values(t, x, signs, self._vector)])
 
     def _motions(self) -> HeldMotions:
-        p = parameter_vector(self._params)
         if self._held is None:
             places = [list(self._params).index(name) for name in self._by]
-            start = np.zeros(self.n)
-            held = HeldMotions(
-                self._core, 0.0, start, p, self._checked.for_core(), list(self._prepared.actions), places
-            )
-            self._held = (p, held)
-        return self._held[1]
+            start, actions = np.zeros(self.n), list(self._prepared.actions)
+            options = self._checked.for_core()
+            self._held = HeldMotions(self._core, 0.0, start, self._vector, options, actions, places)
+        return self._held
 
 
 def _check_names(options: Mapping[str, Any]) -> None:

@@ -63,6 +63,18 @@ class Passage(NamedTuple):
     map: Array
     discrete: tuple[float, ...]
 
+    def derivatives(self) -> Array:
+        """Return the derivatives of the state behind the end; in a last row, those of the equation of the end.
+
+        Their columns are by the state at the start, the time there, the duration, and the parameters.
+        """
+        n, state = len(self.after), self.leg.derivatives
+        rows = self.map if self.row is None else np.concatenate([self.map, self.row[None]])
+        found = rows[:, 1 : 1 + n] @ state
+        found[:, n : n + 2] += rows[:, :1]
+        found[:, n + 2 :] += rows[:, 1 + n :]
+        return np.asarray(found)
+
     def saltation(self, following: Array) -> Array:
         """Return the derivative of the state behind the end by that before, from the velocity behind."""
         n = len(self.after)
@@ -85,15 +97,11 @@ class Shot(NamedTuple):
     jacobian : ndarray, shape (N, N + k)
         Its derivatives by the unknowns, then by the parameters.
     passages : list of Passage
-    states, times : list of ndarray, shape (n, N + k) and (N + k,)
-        The derivatives of the state and of the time at the end of each leg, by unknowns and parameters.
     """
 
     residual: Array
     jacobian: Array
     passages: list[Passage]
-    states: list[Array]
-    times: list[Array]
 
     def monodromy(self) -> Array:
         """Return the derivative of the state after one period by the state at the start, at fixed times.
@@ -159,6 +167,7 @@ class Shooting:
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
         self._guess = itinerary
+        self._unit = np.eye(self.n)
         # The parts of a divided motion keep their shares of it.
         durations = itinerary.durations
         self._shares = [
@@ -220,62 +229,52 @@ class Shooting:
         ModelError
             If a leg cannot be followed.
         """
-        n, m, k = self.n, self.m, len(self.motions.by)
+        n, m, size = self.n, self.m, self.size
         starts, durations, t = self.parts(u)
-        size = self.size
-        residual, jacobian = np.zeros(size), np.zeros((size, size + k))
-        time = np.zeros(size + k)
-        if self.is_free_in_time:
-            time[m * (n + 1)] = 1.0
-        passages, states, times = [], [], []
-        row = m * n
+        residual, jacobian = np.zeros(size), np.zeros((size, size + len(self.motions.by)))
+        passages = []
         for i, leg in enumerate(self.legs):
             if durations[i] < -_NOTHING * sum(durations):
                 raise ModelError(f"the duration of piece {i} of the itinerary is {durations[i]:.3g}")
             passage = self._pass(leg, t, starts[i], durations[i], places)
-            found = passage.leg
-            # The end as a function of all unknowns and parameters; so is its time.
-            state = np.outer(found.velocities[1] - found.by_state @ found.velocities[0], time)
-            state[:, i * n : (i + 1) * n] += found.by_state
-            state[:, size:] += found.by_parameters
-            state[:, m * n + i] += found.velocities[1]
-            time[m * n + i] = 1.0
-            t = passage.t
-            if leg.is_cut:
-                residual[row] = durations[i] - self._shares[i] * durations[i + 1]
-                jacobian[row, m * n + i], jacobian[row, m * n + i + 1] = 1.0, -self._shares[i]
-                row += 1
-            elif passage.row is not None:
-                residual[row] = passage.value
-                jacobian[row] = passage.row[0] * time + passage.row[1 : 1 + n] @ state
-                jacobian[row, size:] += passage.row[1 + n :]
-                row += 1
-            own, following = slice(i * n, (i + 1) * n), (i + 1) % m
-            residual[own] = passage.after - starts[following]
-            jacobian[own] = passage.map[:, 1 : 1 + n] @ state + np.outer(passage.map[:, 0], time)
-            jacobian[own, size:] += passage.map[:, 1 + n :]
-            jacobian[own, following * n : (following + 1) * n] -= np.eye(n)
             passages.append(passage)
-            states.append(state)
-            times.append(time.copy())
+            t = passage.t
+            # The state at the start of the next leg, then what ends this one.
+            first, last, duration = i * (n + 1), i * (n + 1) + n, m * n + i
+            following = (i + 1) % m
+            residual[first:last] = passage.after - starts[following]
+            residual[last] = passage.value
+            found = passage.derivatives()
+            own = jacobian[first : first + len(found)]
+            own[:, i * n : (i + 1) * n] = found[:, :n]
+            own[:, m * n : duration] = found[:, n : n + 1]
+            own[:, duration] = found[:, n + 1]
+            own[:, m * (n + 1) : size] = found[:, n : n + 1]
+            own[:, size:] = found[:, n + 2 :]
+            own[:n, following * n : (following + 1) * n] -= self._unit
+            if leg.is_cut:
+                jacobian[last] = 0.0
+                residual[last] = durations[i] - self._shares[i] * durations[i + 1]
+                jacobian[last, duration], jacobian[last, duration + 1] = 1.0, -self._shares[i]
         if self.period is not None:
-            residual[row] = sum(durations) - self.period.value(self.motions)
-            jacobian[row, m * n : m * (n + 1)] = 1.0
-            if k:
-                jacobian[row, size:] = -self.period.slopes(self.motions)
+            residual[-1] = sum(durations) - self.period.value(self.motions)
+            jacobian[-1, m * n : m * (n + 1)] = 1.0
+            if self.motions.by:
+                jacobian[-1, size:] = -self.period.slopes(self.motions)
         elif self.legs[-1].ending is None:
-            residual[row] = self._along @ (starts[0] - self._reference)
-            jacobian[row, :n] = self._along
-        return Shot(residual, jacobian, passages, states, times)
+            residual[-1] = self._along @ (starts[0] - self._reference)
+            jacobian[-1, :n] = self._along
+        return Shot(residual, jacobian, passages)
 
     def _pass(self, leg: Leg, t0: float, x: Array, duration: float, places: int) -> Passage:
         """Follow a leg, and do what happens at its end."""
         n, k = self.n, len(self.motions.by)
-        found = self.motions.leg(leg.mode, leg.discrete, t0, x, duration, places)
+        guard = None if leg.ending is None else leg.ending.guard
+        found = self.motions.leg(leg.mode, leg.discrete, t0, x, duration, places, guard)
         t, unit = t0 + duration, np.eye(n, 1 + n + k, 1)
         if leg.ending is None:
             return Passage(t, found, 0.0, None, found.x, unit, leg.discrete)
-        value, row = self._end(leg, leg.ending, t, found.x)
+        value, row = found.ending or self._at_time(leg, leg.ending, t, found.x)
         after, discrete, derivative = found.x, leg.discrete, unit
         for index in leg.ending.acts:
             after, discrete, rows, by_time, _ = self.motions.act(index, leg.mode, discrete, t, after)
@@ -285,16 +284,11 @@ class Shooting:
                 derivative[:, 1 + n :] += rows[:, n:]
         return Passage(t, found, value, row, after, derivative, discrete)
 
-    def _end(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
-        """Return the equation of the end of a leg, and its derivatives by time, state and parameters."""
+    def _at_time(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
+        """Return the equation of an end at a known time, and its derivatives by time, state and parameters."""
         n, k = self.n, len(self.motions.by)
         if ending.cuts:
             return 0.0, np.eye(1, 1 + n + k)[0]
-        if ending.guard is not None:
-            place = self.motions.guards(leg.mode, leg.discrete).index(ending.guard)
-            at = self.motions.at(leg.mode, leg.discrete, t, x)
-            parts = [at.by_time[place : place + 1], at.by_state[place], at.by_parameters[place]]
-            return float(at.values[place]), np.concatenate(parts)
         for index in ending.acts:
             clock = self.motions.act(index, leg.mode, leg.discrete, t, x)[4]
             if clock is not None:
@@ -312,7 +306,7 @@ def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] 
     In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
     """
     itinerary, motions = shooting.itinerary(u), shooting.motions
-    growths = [float(np.linalg.norm(passage.leg.by_state, 2)) for passage in shot.passages]
+    growths = [float(np.linalg.norm(passage.leg.by_state)) for passage in shot.passages]
     if not np.isfinite(growths).all() or max(growths) < _GROWTH:
         return None
     legs: list[Leg] = []

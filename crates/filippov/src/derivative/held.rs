@@ -129,27 +129,51 @@ impl<'a> HeldMotion<'a> {
     /// If a function of the user raises.
     pub fn guards_at(&mut self, t: f64, x: &[f64]) -> Result<Vec<GuardAt>, FieldError> {
         let values = self.values(t, x)?;
-        let z = self.state(x);
-        let mut found = Vec::with_capacity(values.len());
-        for (place, value) in values.into_iter().enumerate() {
-            let guard = self.guards[place];
-            let mut gradient = self.piece.gradient_of(guard, t, &z)?;
-            let sense = match guard {
-                Guard::Surface(j) => f64::from(self.piece.mode.entries()[j]),
-                Guard::Multiplier { surface, end } if self.is_smooth(surface) => -f64::from(end),
-                _ => 1.0,
-            };
-            gradient.time *= sense;
-            gradient.state.iter_mut().for_each(|entry| *entry *= sense);
-            let time = gradient.time;
-            let state = self.piece.extended.without_named(&gradient.state);
-            found.push(GuardAt {
-                guard,
-                value,
-                gradient: Gradient { time, state },
-            });
-        }
-        Ok(found)
+        let guards = values.into_iter().enumerate();
+        guards
+            .map(|(place, value)| self.with_gradient(place, value, t, x))
+            .collect()
+    }
+
+    /// One of the guards at a place, by its number, with its derivatives.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn guard_at(
+        &mut self,
+        place: usize,
+        t: f64,
+        x: &[f64],
+    ) -> Result<Option<GuardAt>, FieldError> {
+        let value = self.values(t, x)?.get(place).copied();
+        value
+            .map(|value| self.with_gradient(place, value, t, x))
+            .transpose()
+    }
+
+    fn with_gradient(
+        &mut self,
+        place: usize,
+        value: f64,
+        t: f64,
+        x: &[f64],
+    ) -> Result<GuardAt, FieldError> {
+        let (guard, z) = (self.guards[place], self.state(x));
+        let mut gradient = self.piece.gradient_of(guard, t, &z)?;
+        let sense = match guard {
+            Guard::Surface(j) => f64::from(self.piece.mode.entries()[j]),
+            Guard::Multiplier { surface, end } if self.is_smooth(surface) => -f64::from(end),
+            _ => 1.0,
+        };
+        gradient.time *= sense;
+        gradient.state.iter_mut().for_each(|entry| *entry *= sense);
+        let time = gradient.time;
+        let state = self.piece.extended.without_named(&gradient.state);
+        Ok(GuardAt {
+            guard,
+            value,
+            gradient: Gradient { time, state },
+        })
     }
 
     /// Is the guard of a multiplier a function of the multiplier itself? That of static friction is not.

@@ -1,6 +1,6 @@
 //! A motion that is held in one mode over a given time, whatever its guards are: a leg of an itinerary.
 
-use crate::derivative::{Column, Extended, HeldMotion, Tangents};
+use crate::derivative::{Column, Extended, GuardAt, HeldMotion, Tangents};
 use crate::error::{Error, FieldError};
 use crate::integrate::{Problem, Reached};
 use crate::mode::Mode;
@@ -9,15 +9,17 @@ use crate::record::Side;
 use crate::status::Stop;
 use crate::system::{Actions, TracedSystem};
 
-/// Over what time a leg goes, from where, and at how many places in each step its guards are evaluated.
+/// Over what time a leg goes, from where, and what of its guards is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Over<'s> {
     /// Its first and last time.
     pub span: (f64, f64),
     /// The state at its start.
     pub start: &'s [f64],
-    /// The places in each step, or none.
+    /// At how many places in each step all guards are evaluated.
     pub places: usize,
+    /// The number of the guard that the leg ends at.
+    pub ending: Option<usize>,
 }
 
 /// A leg.
@@ -31,6 +33,8 @@ pub struct Leg {
     pub derivative: Vec<f64>,
     /// Times, and the values of the guards there.
     pub samples: Vec<(f64, Vec<f64>)>,
+    /// The guard that the leg ends at, there.
+    pub ending: Option<GuardAt>,
     /// Why it ended.
     pub stop: Stop,
 }
@@ -47,6 +51,7 @@ pub fn leg(
         span,
         start,
         places,
+        ending,
     }: Over,
     interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<Leg, LegError> {
@@ -94,11 +99,16 @@ pub fn leg(
     if places > 0 {
         samples.push((solution.t_last, motion.values(solution.t_last, &x)?));
     }
+    let ending = match ending {
+        Some(place) => motion.guard_at(place, solution.t_last, &x)?,
+        None => None,
+    };
     Ok(Leg {
         x,
         velocities,
         derivative,
         samples,
+        ending,
         stop: solution.stop,
     })
 }
