@@ -147,7 +147,11 @@ class Ensemble(Sequence[Solution]):
         if self._wanted is not None:
             t0 = self._t_span[0]
             members = zip(self._run_of_each(), self._prepared, strict=False)
-            found += [len(derivative_warnings(run, t0, prepared.surfaces)) for run, prepared in members]
+            has_parameters = bool(self._wanted.parameters)
+            found += [
+                len(derivative_warnings(run, t0, used.surfaces, used.borders if has_parameters else ()))
+                for run, used in members
+            ]
         return found
 
     @cached_property

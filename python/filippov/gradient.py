@@ -170,7 +170,8 @@ def gradient(
     value, found, lost, borders = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
-    for border in borders_of(borders, sol.status == 0, sol.surfaces):
+    conditions = sol._origin.prepared.borders if any(name in values for name in sol.wrt) else ()
+    for border in borders_of(borders, sol.status == 0, sol.surfaces, conditions):
         warn_user([f"the run {border.what}: the gradient {border.whose} is that of one side"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
     return value, {name: entry for name, entry in entries if name != _RUNNING}

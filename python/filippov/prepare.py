@@ -53,6 +53,8 @@ class Prepared(NamedTuple):
         Names outside of itself that a traced function with an ``if`` assigns.
     doubts : tuple of str
         What may be wrong with the comparisons of a traced function, for warnings.
+    borders : tuple of str
+        Conditions on parameters that others, as near to these as one likes, decide differently.
     """
 
     core: CoreSystem
@@ -63,6 +65,7 @@ class Prepared(NamedTuple):
     actions: tuple[CoreAction, ...] = ()
     remembers: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    borders: tuple[str, ...] = ()
 
     @property
     def why_untraced(self) -> str:
@@ -167,7 +170,7 @@ def prepare(
             return _prepare_opaque(source, n, values, t0, y0, error)
         else:
             raise
-    actions, is_pinned = _actions(source, traced.triggers, n, values, states, t0, start)
+    actions, is_pinned, borders = _actions(source, traced.triggers, n, values, states, t0, start)
     pinned = dict(values) if traced.guards or is_pinned else None
     remembers = tuple(remembered(source.fun)) if traced.n_paths > 1 else ()
     prepared = Prepared(
@@ -179,6 +182,7 @@ def prepare(
         actions,
         remembers,
         traced.doubts,
+        traced.borders + borders,
     )
     # A function that has changed what it reads, a counter for instance, is traced again at the next call.
     if key is not None and key == _key(source, n, values, states):
@@ -272,10 +276,10 @@ def _actions(
     states: Sequence[str] | None,
     t0: float,
     y0: Array,
-) -> tuple[tuple[CoreAction, ...], bool]:
-    """Return the resets for the core, traced if possible, and whether they hold for these values only."""
+) -> tuple[tuple[CoreAction, ...], bool, tuple[str, ...]]:
+    """Return the resets for the core, traced if possible; whether they hold for these values only; borders."""
     surfaces = iter(triggers)
-    actions, is_pinned = [], False
+    actions, is_pinned, borders = [], False, ()
     discrete = source.discrete
     start = np.append(y0, [values[name] for name in discrete])
     for k, reset in enumerate(source.resets):
@@ -303,9 +307,10 @@ def _actions(
             raise ModelError(f"resets: entry {k} ({reset.name}): {NO_MEMORY_IN_A_MAP}")
         is_exact, for_these_values = (False, True) if traced is None else traced.is_exact_at_an_instant()
         is_pinned |= for_these_values or not is_exact
+        borders += () if traced is None else traced.borders
         core_map: Any = traced.system if traced is not None and is_exact else bound
         actions.append(reset.action(None if reset.h is None else next(surfaces), core_map))
-    return tuple(actions), is_pinned
+    return tuple(actions), is_pinned, borders
 
 
 def _prepare_opaque(

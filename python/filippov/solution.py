@@ -376,7 +376,8 @@ class Solution:
         origin = self._origin
         found += [RunWarning(origin.t0, code, text, ()) for code, text in origin.prepared.warnings]
         if origin.wanted is not None and isinstance(self._run, Run):
-            found += derivative_warnings(self._run, origin.t0, self.surfaces)
+            conditions = origin.prepared.borders if origin.wanted.parameters else ()
+            found += derivative_warnings(self._run, origin.t0, self.surfaces, conditions)
         return found
 
     @cached_property

@@ -667,8 +667,10 @@ class Border(NamedTuple):
     is_end: bool = False
 
 
-def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -> list[Border]:
-    """Return where the derivatives of a run are those of one side, from what the core found."""
+def borders_of(
+    found: Borders, ends_at_given_time: bool, names: Sequence[str], conditions: Sequence[str]
+) -> list[Border]:
+    """Return where the derivatives of a run are those of one side, from what the core and the trace found."""
     starts_on, lands_on, starts_at_action, starts_at_tick, starts_at_threshold, ends_at_instant = found
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
@@ -685,16 +687,22 @@ def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -
         borders.append(Border("starts at the very time of a tick", "by the start"))
     if starts_at_threshold:
         borders.append(Border("starts at the threshold of a law", f"by {_MOVED}"))
+    borders += (Border(f"has parameters at the border {text}", "by these") for text in conditions)
     if ends_at_instant and ends_at_given_time:
         what = "ends at the very time of a switch, which a changed run completes earlier or later"
         borders.append(Border(what, "at its end", is_end=True))
     return borders
 
 
-def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWarning]:
-    """Return what a run with ``wrt=`` met that its derivatives do not pass, or have on one side only."""
+def derivative_warnings(
+    run: Run, t0: float, names: Sequence[str], conditions: Sequence[str]
+) -> list[RunWarning]:
+    """Return what a run with ``wrt=`` met that its derivatives do not pass, or have on one side only.
+
+    The conditions are those on the parameters asked for that others as near as one likes decide differently.
+    """
     found = []
-    for border in borders_of(run.borders(), run.status == 0, names):
+    for border in borders_of(run.borders(), run.status == 0, names, conditions):
         text = f"the run {border.what}: derivatives {border.whose} are those of one side"
         t = run.t_last if border.is_end else t0 if border.t is None else border.t
         found.append(RunWarning(t, "one_sided", text, (), border.surfaces))

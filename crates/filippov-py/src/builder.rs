@@ -270,7 +270,8 @@ impl Builder {
         self.graph().n_surfaces()
     }
 
-    /// The pieces of an expression, none if they were not found out; and whether they are those of these parameters only.
+    /// The pieces of an expression, none if they were not found out; whether they are those of these parameters only, and whether
+    /// those as near to these as one likes have others.
     fn pieces<'py>(
         &self,
         py: Python<'py>,
@@ -279,16 +280,16 @@ impl Builder {
         discrete: Vec<String>,
         most: usize,
         in_full: bool,
-    ) -> PyResult<(Option<Bound<'py, PyAny>>, bool)> {
+    ) -> PyResult<(Option<Bound<'py, PyAny>>, bool, bool)> {
         let discrete = by_name(&discrete)?;
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;
         let mut regions = Regions::new(std::mem::take(&mut *graph), parameters, discrete);
         let pieces = regions.pieces(a, most, in_full);
-        let used_parameters = regions.used_parameters();
+        let (used_parameters, is_at_border) = (regions.used_parameters(), regions.is_at_border());
         *graph = regions.into_graph();
         let tuples = pieces.map(|pieces| as_tuples(py, &pieces)).transpose()?;
-        Ok((tuples, used_parameters))
+        Ok((tuples, used_parameters, is_at_border))
     }
 
     #[pyo3(signature = (a, states=None, parameters=None))]

@@ -82,6 +82,11 @@ impl Regions {
         self.lock().used_parameters()
     }
 
+    #[getter]
+    fn is_at_border(&self) -> bool {
+        self.lock().is_at_border()
+    }
+
     fn question(&self, node: u32) -> PyResult<(u32, i64, f64, bool)> {
         let mut regions = self.lock();
         let node = Builder::node(regions.graph(), node)?;

@@ -43,6 +43,7 @@ MANY = 3
 
 # An expression that jumps is taken apart into that many parts at most: a limiter of a limiter has a dozen.
 MOST_JUMPING_PARTS = 128
+_OF_REGIONS = "between forms of its comparisons"
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,16 @@ class Guard:
     text : str
         The expression whose sign was used.
     sign : float
-        Its sign, over {-1, 0, +1}.
+        Its sign, over {-1, 0, +1}; NaN if it has several.
     """
 
     text: str
     sign: float
+
+    @property
+    def border(self) -> str:
+        """Where the parameters are, if the sign is zero."""
+        return self.text if self.text == _OF_REGIONS else f"{self.text} = 0"
 
 
 class Question(NamedTuple):
@@ -389,11 +395,10 @@ class Tracer:
             return self._pieces[node, in_full]
         if (node, in_full) not in self._pieces:
             most = MOST_COMBINATIONS if len(self.unresolved) < MANY else MOST_AFTER_MANY
-            pieces, for_these_values = self.builder.pieces(
+            pieces, for_these_values, is_at_border = self.builder.pieces(
                 node, self.values.tolist(), self.laws.discrete(), most, in_full
             )
-            if for_these_values:
-                self.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
+            self.guard_regions(for_these_values, is_at_border)
             if pieces is None and not self.builder.is_stepwise(node):
                 self.unresolved[node] = None
             # An expression of one sign, zeros at single points aside, is left to its surface.
@@ -414,7 +419,7 @@ class Tracer:
         np.sign(x - 1))``. And what stays as it is has the sign that Python gives it.
         """
         known = (self.values.tolist(), self.laws.discrete())
-        parts, for_these_values = self.builder.pieces(node, *known, MOST_JUMPING_PARTS, True)
+        parts, for_these_values, _ = self.builder.pieces(node, *known, MOST_JUMPING_PARTS, True)
         if parts is None or for_these_values:
             return None
         stays = any(self.is_constant_of_motion(part) for part, sign in parts_of(parts) if sign is None)
@@ -428,6 +433,11 @@ class Tracer:
     def regions(self) -> Regions:
         """Return the regions of the expressions so far."""
         return Regions(self.builder, self.values.tolist(), self.laws.discrete())
+
+    def guard_regions(self, for_these_values: bool, is_at_border: bool) -> None:
+        """Note whether regions are those of these parameters, and whether others are as near as one likes."""
+        if for_these_values and (is_at_border or -1 not in self.guards):
+            self.guards[-1] = Guard(_OF_REGIONS, 0.0 if is_at_border else np.nan)
 
     def jumps(self, node: int) -> bool:
         """Whether an expression jumps where a sign inside of it changes, or is not seen to be continuous."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from filippov.errors import TraceError
-from filippov.trace.branching import MOST_COMBINATIONS, Guard, Question
+from filippov.trace.branching import MOST_COMBINATIONS, Question
 from filippov.trace.explain import BLACK_BOX, UserLine
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ def check_questions(tracer: Tracer, roots: Roots, role: str, again: Again | None
     check.doubt_unresolved()
     for surface in range(tracer.builder.n_surfaces() - tracer.laws.n_guards):
         check.surface(surface)
-    if check.regions.used_parameters:
-        tracer.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
+    tracer.guard_regions(check.regions.used_parameters, check.regions.is_at_border)
     return tuple(check.doubts)
 
 

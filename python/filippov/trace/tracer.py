@@ -95,6 +95,11 @@ class Trace:
     root_ends: str = ""
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
+    @property
+    def borders(self) -> tuple[str, ...]:
+        """Conditions on parameters that others, as near to these as one likes, decide differently."""
+        return tuple(guard.border for guard in self.guards if guard.sign == 0.0)
+
     def is_exact_at_an_instant(self) -> tuple[bool, bool]:
         """Return whether every value is that of the function, and if for these parameters only."""
         is_exact, for_these_values = is_exact_at_an_instant(self.tracer, self.field)

@@ -69,6 +69,22 @@ enum Possible {
     Yes,
 }
 
+/// What counts as a number in the inequalities of a region.
+#[derive(Clone, Copy, PartialEq)]
+enum Numbers {
+    /// Constants alone: parameters are free.
+    Constants,
+    /// Constants, and the parameters with their values.
+    All,
+}
+
+/// Whether a region has its edges.
+#[derive(Clone, Copy, PartialEq)]
+enum Edges {
+    Open,
+    Closed,
+}
+
 /// In questions about the field that many combinations of other signs are looked at.
 const MOST_COMBINATIONS: usize = 256;
 
@@ -78,6 +94,7 @@ pub struct Regions {
     parameters: Vec<f64>,
     discrete: Vec<Discrete>,
     used_parameters: bool,
+    is_at_border: bool,
 }
 
 impl Regions {
@@ -88,6 +105,7 @@ impl Regions {
             parameters,
             discrete,
             used_parameters: false,
+            is_at_border: false,
         }
     }
 
@@ -104,6 +122,11 @@ impl Regions {
     /// Whether an answer was true for these values of the parameters only.
     pub fn used_parameters(&self) -> bool {
         self.used_parameters
+    }
+
+    /// Whether an answer is another one for parameters as near to these as one likes.
+    pub fn is_at_border(&self) -> bool {
+        self.is_at_border
     }
 
     /// The sign that an expression has been given: of a product with signs in front that of the rest, and where it switches.
@@ -132,7 +155,7 @@ impl Regions {
         for at in (0..kept.len()).rev() {
             let mut flipped = kept.clone();
             flipped[at].1 = -flipped[at].1;
-            if !self.is_solvable(&flipped, &[], true) {
+            if !self.is_solvable(&flipped, &[], Numbers::All, Edges::Open) {
                 kept.remove(at);
             }
         }
@@ -160,12 +183,12 @@ impl Regions {
             }
             let form = LinearForm::of(&self.graph, value);
             if !self.graph.facts(value).has_sign || form.is_zero() {
-                let (region, is_known) = self.region(value, &form, signs);
+                let (region, is_known) = self.region(value, &form, signs, Numbers::Constants);
                 if is_here {
                     found.is_complete &= is_known;
                     found.regions.push(region);
-                } else {
-                    self.used_parameters |= region.kind == Kind::Zero || !is_known;
+                } else if region.kind == Kind::Zero || !is_known {
+                    self.is_possible(&region.signs, None);
                 }
                 continue;
             }
@@ -301,15 +324,20 @@ impl Regions {
     /// remembered.
     fn is_possible(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> bool {
         let possible = self.possible(signs, also);
-        self.used_parameters |= possible == Possible::NotForParameters;
+        if possible == Possible::NotForParameters {
+            self.used_parameters = true;
+            self.is_at_border |= self.is_possible_with(signs, also, Numbers::All, Edges::Closed);
+        }
         possible == Possible::Yes
     }
 
     /// Whether there may be a point with these signs, at which moreover side * value > 0 (side 0: value = 0).
     fn possible(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> Possible {
-        if !self.is_possible_with(signs, also, false) {
+        if !self.is_possible_with(signs, also, Numbers::Constants, Edges::Open) {
             Possible::Never
-        } else if self.parameters.is_empty() || self.is_possible_with(signs, also, true) {
+        } else if self.parameters.is_empty()
+            || self.is_possible_with(signs, also, Numbers::All, Edges::Open)
+        {
             Possible::Yes
         } else {
             Possible::NotForParameters
@@ -320,7 +348,8 @@ impl Regions {
         &mut self,
         signs: &[Option<f64>],
         also: Option<(NodeId, f64)>,
-        with_parameters: bool,
+        numbers: Numbers,
+        edges: Edges,
     ) -> bool {
         let mut sides = Vec::new();
         for (k, sign) in (0..).zip(signs) {
@@ -333,7 +362,7 @@ impl Regions {
         }
         let known = self.graph.not_negative.clone();
         let known = self.graph.at_signs(&known, signs);
-        self.is_solvable(&sides, &known, with_parameters)
+        self.is_solvable(&sides, &known, numbers, edges)
     }
 
     /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0), where the known values are not negative.
@@ -341,27 +370,28 @@ impl Regions {
         &mut self,
         sides: &[(NodeId, f64)],
         known: &[NodeId],
-        with_parameters: bool,
+        numbers: Numbers,
+        edges: Edges,
     ) -> bool {
         let mut rows = Vec::new();
         for &(mut function, side) in sides {
-            if with_parameters {
+            if numbers == Numbers::All {
                 function = self.with_parameters(function);
             }
             let form = LinearForm::of(&self.graph, function);
             if side == 0.0 {
                 rows.extend([1.0, -1.0].map(|side| Inequality::new(&form, side, false)));
             } else if !form.is_zero() {
-                rows.push(Inequality::new(&form, side, true));
+                rows.push(Inequality::new(&form, side, edges == Edges::Open));
             }
         }
         let mut atoms: Vec<NodeId> = rows.iter().flat_map(Inequality::atoms).collect();
         atoms.sort_unstable();
         atoms.dedup();
         for &known in known {
-            let known = match with_parameters {
-                true => self.with_parameters(known),
-                false => known,
+            let known = match numbers {
+                Numbers::All => self.with_parameters(known),
+                Numbers::Constants => known,
             };
             let form = LinearForm::of(&self.graph, known);
             // Of other atoms nothing else is known.
@@ -389,12 +419,14 @@ impl Regions {
         self.graph.at_parameters(node, |k| values.get(k).copied())
     }
 
-    /// What an expression without signs is in a region, and whether that is known.
+    /// What an expression without signs is in a region, and whether that is known; its sign where it moves as far as the numbers
+    /// tell.
     fn region(
         &mut self,
         value: NodeId,
         form: &LinearForm,
         signs: Vec<Option<f64>>,
+        numbers: Numbers,
     ) -> (Region, bool) {
         let mut region = Region {
             signs,
@@ -418,7 +450,9 @@ impl Regions {
             let Some(found) = found else {
                 return (region, false);
             };
-            self.used_parameters |= found.is_number && !self.parameters.is_empty();
+            let is_for_these = found.is_number && !self.parameters.is_empty();
+            self.used_parameters |= is_for_these;
+            self.is_at_border |= is_for_these && found.kind == Kind::Zero;
             (region.kind, region.value, region.step) = (found.kind, found.value, found.step);
             return (region, true);
         }
@@ -432,9 +466,13 @@ impl Regions {
         }
         let rootless = inverses::within_domain(&mut self.graph, form);
         let (value, sense) = rootless.unwrap_or((value, 1.0));
-        if self.possible(&signs, Some((value, -sense))) != Possible::Yes {
+        let mut is_never = |sense: f64| match numbers {
+            Numbers::Constants => self.possible(&signs, Some((value, sense))) == Possible::Never,
+            Numbers::All => !self.is_possible(&signs, Some((value, sense))),
+        };
+        if is_never(-sense) {
             region.kind = Kind::Positive;
-        } else if self.possible(&signs, Some((value, sense))) != Possible::Yes {
+        } else if is_never(sense) {
             region.kind = Kind::Negative;
         }
         (region, true)

@@ -1,7 +1,7 @@
 //! An expression that is identically zero in some region, in pieces: a comparison with zero is decided there by the number 0,
 //! and elsewhere by what the expression is on the sides of the surfaces inside of it.
 
-use super::{Kind, Regions};
+use super::{Kind, Numbers, Regions};
 use crate::linear::LinearForm;
 use crate::node::NodeId;
 
@@ -108,8 +108,14 @@ impl Regions {
                 if 1 << n_inner.min(31) > MOST_OF_NO_ZERO && !self.graph.is_stepwise(node) {
                     return Some(Pieces::Part(node, PartSign::Open));
                 }
+                let before = (self.used_parameters, self.is_at_border);
                 let pieces = self.all_pieces(node, MOST_OF_NO_ZERO.min(most), false);
-                return Some(pieces.unwrap_or(Pieces::Part(node, PartSign::Open)));
+                let pieces = pieces.unwrap_or(Pieces::Part(node, PartSign::Open));
+                if pieces.has_open() {
+                    // For other parameters it may be left in one piece as well.
+                    (self.used_parameters, self.is_at_border) = before;
+                }
+                return Some(pieces);
             }
         }
         self.all_pieces(node, most, in_full)
@@ -130,7 +136,12 @@ impl Regions {
         *budget = budget.checked_sub(1)?;
         let form = LinearForm::of(&self.graph, value);
         if !self.graph.facts(value).has_sign || form.is_zero() {
-            let (region, _) = self.region(value, &form, signs.to_vec());
+            // All parts of an expression are to be those for all parameters.
+            let numbers = match in_full {
+                true => Numbers::Constants,
+                false => Numbers::All,
+            };
+            let (region, _) = self.region(value, &form, signs.to_vec(), numbers);
             let sign = match region.kind {
                 Kind::Zero if region.value == Some(0.0) => PartSign::Known(0.0),
                 Kind::Zero => PartSign::Held,

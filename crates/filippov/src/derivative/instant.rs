@@ -9,7 +9,7 @@ use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
-use crate::system::{Act, SignStructure};
+use crate::system::{Act, PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -159,7 +159,7 @@ impl Instant<'_, '_> {
             passage.changes.push(entry);
             return Ok(Ok(passage));
         }
-        if record.guards.len() > 1 {
+        if record.guards.len() > 1 || self.passes_others_apart(&passage.time)? {
             return Ok(Err(Lost::OneSided));
         }
         let (map, mut moved) = self.mapped()?;
@@ -236,6 +236,44 @@ impl Instant<'_, '_> {
         let z = self.extended.state(self.record.x[0]);
         let place = self.before.at(self.record.t[0], &z);
         self.extended.time_of_tick(act.index, &place)
+    }
+
+    /// The surfaces that the motion passes besides those that fix the time, as their functions vanish there too.
+    pub(super) fn passed_with_it(&self) -> Result<Vec<usize>, FieldError> {
+        let record = self.record;
+        let entries = record.mode.map(|mode| mode.entries());
+        let is_passed = |j: &usize| {
+            let (before, after) = (entries[0][*j], entries[1][*j]);
+            before != 0 && before != after && !record.guards.contains(&Guard::Surface(*j))
+        };
+        let mut passed: Vec<usize> = (0..entries[0].len()).filter(is_passed).collect();
+        if !record.acts.is_empty() || passed.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (t, z) = (record.t[0], self.extended.state(record.x[0]));
+        let (h, place) = (self.before.surfaces(t, &z)?, self.before.at(t, &z));
+        let mut near = Vec::with_capacity(passed.len());
+        for &j in &passed {
+            near.push(h[j].abs() <= AT_SIDE * self.extended.system.surface_size(j, &place)?);
+        }
+        let mut near = near.into_iter();
+        passed.retain(|_| near.next() == Some(true));
+        Ok(passed)
+    }
+
+    /// Does a changed motion pass some of them at another time than this?
+    fn passes_others_apart(&mut self, time: &[f64]) -> Result<bool, FieldError> {
+        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
+        for j in self.passed_with_it()? {
+            let own = self.before.gradient_of(Guard::Surface(j), t, &z)?;
+            let rate = own.time + dot(&own.state, self.record.field[0]);
+            let size = own.state.iter().fold(rate.abs(), |most, g| most.max(g.abs()));
+            let mut entries = own.state.iter().zip(time);
+            if entries.any(|(g, time)| (g + rate * time).abs() > AT_SIDE * size) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.

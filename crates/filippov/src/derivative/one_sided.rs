@@ -78,15 +78,18 @@ impl<'a> Instant<'_, 'a> {
             })
             .collect();
         let entries = record.mode.map(|mode| mode.entries());
-        let Some(surfaces) = surfaces.filter(|all| {
-            let differs = |j: usize| entries[0][j] != entries[1][j];
-            record.acts.is_empty()
-                && (2..=MOST_AT_ONCE).contains(&all.len())
-                && (0..entries[0].len()).all(|j| all.contains(&j) == differs(j))
-                && all.iter().all(|&j| entries[0][j] != 0)
-        }) else {
+        let Some(mut surfaces) = surfaces else {
             return Ok(None);
         };
+        surfaces.extend(self.passed_with_it()?);
+        let differs = |j: usize| entries[0][j] != entries[1][j];
+        let are_all = record.acts.is_empty()
+            && (2..=MOST_AT_ONCE).contains(&surfaces.len())
+            && (0..entries[0].len()).all(|j| surfaces.contains(&j) == differs(j))
+            && surfaces.iter().all(|&j| entries[0][j] != 0);
+        if !are_all {
+            return Ok(None);
+        }
         let mut cones = Vec::new();
         for order in orders(&surfaces) {
             match self.one_after_the_other(&order)? {
