@@ -152,3 +152,62 @@ def test_sliding_that_ends_at_a_two_fold() -> None:
     assert sol.sol.multipliers(sol.switches.t[1] - 1e-6)[0] == pytest.approx(-0.3223, abs=1e-3)
     assert sol.switches[1].derivative.lost == "grazing"
     assert np.isnan(sol.derivative()).all()
+
+
+@pytest.mark.parametrize(
+    ("fun", "p", "border"),
+    [
+        (lambda t, x, p: [x[0] - np.floor(p)], 1.0, "p - 1 = 0"),
+        (lambda t, x, p: [x[0] - max(p, 1.0)], 1.0, "1 - p = 0"),
+        (lambda t, x, p: [abs(p) - x[0]], 0.0, "p = 0"),
+        (lambda t, x, p: [x[0] - (p if p > 0.1 else 3 * p)], 0.1, "p - 0.1 = 0"),
+        (lambda t, x, p: [1 - 0.7 * np.sign(x[0] + p * np.sign(x[0] - 0.1))], 0.1, "between forms"),
+        (lambda t, x, p: [1 - 0.7 * np.sign(np.maximum(x[0] - 0.9, 0) - p)], 0.0, "between forms"),
+    ],
+    ids=["floor", "maximum", "abs", "if", "nested sign", "plateau"],
+)
+def test_parameters_at_a_border_between_two_forms_of_the_function(fun: Any, p: float, border: str) -> None:
+    """The derivative by the parameter is that of one side, and is said to be; the others are not."""
+    system = fl.System(fun, n=1, params={"p": p})
+    with pytest.warns(fl.FilippovWarning, match=f"at the border {border}"):
+        sol = system.solve((0, 1), [-0.5], wrt=["p"])
+    assert [warning.code for warning in sol.warnings] == ["one_sided"]
+    assert not system.solve((0, 1), [-0.5], wrt=["y0"]).warnings
+    assert not system.solve((0, 1), [-0.5], {"p": p + 0.05}, wrt=["p"]).warnings
+    with pytest.warns(fl.FilippovWarning, match=f"at the border {border}"):
+        fl.gradient(system, (0, 1), [-0.5], terminal=lambda t, y: y[0], wrt=["p"])
+
+
+def test_surfaces_that_coincide_for_a_value_of_a_parameter() -> None:
+    """Both vanish at one time, found as the zero of one: a parameter moves that alone, and the order counts."""
+
+    def fun(t: float, x: Any, p: float) -> Any:
+        level = np.exp(x[2]) - 1 + 0.1 * x[1]
+        return [-0.4 * (level < -0.09), -0.96 * (level < -p) * np.sin(x[0]), 1.0]
+
+    start = [0.5, -0.7, -0.05]
+    system = fl.System(fun, n=3, params={"p": 0.09})
+    with pytest.warns(fl.FilippovWarning, match="depends on their order"):
+        sol = system.solve((0, 1), start, wrt=["p"], rtol=1e-10, atol=1e-10)
+    assert np.isnan(sol.derivative()).all()
+    ends = [system.solve((0, 1), start, {"p": 0.09 + d}, rtol=1e-12).y[:, -1] for d in (1e-5, 0.0, -1e-5)]
+    slopes = np.array([(ends[0] - ends[1]) / 1e-5, (ends[1] - ends[2]) / 1e-5])
+    assert np.max(np.abs(slopes[0] - slopes[1])) > 1e-3
+    # Where no order counts the derivative is known: each moves its own state.
+    apart = fl.System(
+        lambda t, x, p: [1.0 * (x[2] < 0.5), 1.0 * (x[2] < p), 1.0], n=3, params={"p": 0.5}
+    )
+    known = apart.solve((0, 1), [0.0, 0.0, 0.0], wrt=["p"])
+    np.testing.assert_allclose(known.derivative()[:, 0], [0.0, 1.0, 0.0], atol=1e-12)
+    assert not known.warnings
+
+
+def test_a_start_on_a_surface_slid_on_and_on_one_that_is_left() -> None:
+    """A start beside both comes to the surface slid on across the other one, or not: both are named."""
+
+    def fun(t: float, x: Any) -> Any:
+        return [-2 * np.sign(x[0] + 0.3 * x[1]), 1.0 + 0.5 * np.sign(x[1])]
+
+    with pytest.warns(fl.FilippovWarning, match="starts on"):
+        sol = fl.System(fun, n=2).solve((0, 1), [0.0, 0.0], wrt="y0")
+    assert len(sol.warnings[0].surfaces) == 2

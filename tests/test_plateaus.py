@@ -488,3 +488,25 @@ def test_a_search_that_is_given_up_is_warned_of() -> None:
 )
 def test_what_stands_halfway_is_rounded_to_the_even_number(rounded: Any, exact: float) -> None:
     assert final(lambda x: 1.0 * rounded(x), -2.0, 4.0) == pytest.approx(exact, abs=1e-9)
+
+
+@pytest.mark.parametrize("values", [(0.1, 0.2, 0.05), (0.05, 0.2, -0.2), (0.2, -0.2, 0.05)])
+def test_a_form_that_holds_for_some_parameters_is_not_taken_for_others(values: tuple[float, ...]) -> None:
+    """Below 0.1 the inner function is x - p, with a zero there for p < 0.1 alone; above it is x + p."""
+
+    def fun(t: float, x: Any, p: float) -> Any:
+        return [1.0 - 0.78 * np.sign(x[0] + p * np.sign(x[0] - 0.1))]
+
+    system = fl.System(fun, n=1, params={"p": values[0]})
+    for p in values:
+        # From -0.5 at the speed 1.78 to where the sign changes, then at 0.22.
+        turn = p if p < 0.1 else 0.1
+        if p < 0:
+            turn = p  # x - p is negative up to there
+        end = turn + 0.22 * (5 - (turn + 0.5) / 1.78)
+        if p == -0.2:
+            # At 0.1 the inner function jumps from 0.3 to -0.1: the fast motion again, up to 0.2.
+            first = (turn + 0.5) / 1.78 + (0.1 - turn) / 0.22
+            second = first + 0.1 / 1.78
+            end = 0.2 + 0.22 * (5 - second)
+        assert system.solve((0, 5), [-0.5], {"p": p}).y[0, -1] == pytest.approx(end, abs=1e-6), p

@@ -113,9 +113,7 @@ impl Mode {
             many => Signs::from_elem(1.0, many),
         };
         for (sign, &entry) in signs.iter_mut().zip(self.entries()) {
-            if entry < 0 {
-                *sign = -1.0;
-            }
+            *sign = if entry < 0 { -1.0 } else { 1.0 };
         }
         signs
     }

@@ -85,14 +85,16 @@ impl Kind {
     /// The kind that leads from one mode to another.
     pub fn between(before: &Mode, after: &Mode) -> Kind {
         use std::cmp::Ordering::{Equal, Greater, Less};
-        let (mut is_same, mut ended, mut begun) = (true, 0, 0);
-        for (before, after) in before.entries().iter().zip(after.entries()) {
-            is_same &= before == after;
-            ended += usize::from(*before == 0 && *after != 0);
-            begun += usize::from(*before != 0 && *after == 0);
+        if before == after {
+            return Kind::Grazing;
+        }
+        let (mut ended, mut begun) = (0, 0);
+        let pairs = before.entries().iter().zip(after.entries());
+        for (before, after) in pairs.filter(|(before, after)| before != after) {
+            ended += usize::from(*before == 0);
+            begun += usize::from(*after == 0);
         }
         match begun.cmp(&ended) {
-            _ if is_same => Kind::Grazing,
             Greater => Kind::EnterSliding,
             Less => Kind::ExitSliding,
             Equal if begun == 0 => Kind::Crossing,

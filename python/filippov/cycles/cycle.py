@@ -298,9 +298,14 @@ def _rank(matrix: Array) -> int:
 
 
 def multipliers_of(shot: Shot, is_forced: bool, n_zero: int = 0) -> npt.NDArray[np.complex128]:
-    """Return the multipliers, largest first: exact zeros last, and exactly 1 once without forcing."""
+    """Return the multipliers, largest first: exact zeros last, and exactly 1 once without forcing.
+
+    They are NaN where a leg ends without speed.
+    """
     across = None if is_forced else shot.across()
     own = shot.monodromy() if across is None else across
+    if not np.isfinite(own).all():
+        return np.full(len(own), np.nan, dtype=np.complex128)
     found = np.linalg.eigvals(own).astype(np.complex128)
     if across is not None:
         found = np.append(found, 1.0)

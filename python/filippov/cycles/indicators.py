@@ -49,10 +49,9 @@ def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[A
 
 
 def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
-    monodromy = shot.monodromy()
-    if not np.all(np.isfinite(monodromy)):  # an impact without speed
-        return {}
     values = multipliers_of(shot, curve.shooting.period is not None)
+    if not np.all(np.isfinite(values)):  # an impact without speed
+        return {}
     found: dict[Any, float] = {("PD",): float(np.prod(1.0 + values).real)}
     if curve.shooting.period is None:
         values = np.delete(values, int(np.argmin(np.abs(values - 1.0))))

@@ -80,9 +80,9 @@ fn add_inactive_that_begin_to_matter(
 ) -> Result<(), FieldError> {
     let before = &reached.before;
     let mut zeros = reached.surfaces.to_vec();
-    for (j, h) in h.iter().enumerate() {
-        let may_matter =
-            !at.arrival.active[j] && before.entries()[j] != 0 && at.system.switches_at(j);
+    let inactive = h.iter().zip(at.arrival.active).enumerate();
+    for (j, (h, _)) in inactive.filter(|(_, (_, is_active))| !**is_active) {
+        let may_matter = before.entries()[j] != 0 && at.system.switches_at(j);
         if !may_matter || at.arrival.departing.contains(&j) || zeros.contains(&j) {
             continue;
         }
@@ -104,9 +104,10 @@ fn add_inactive_that_begin_to_matter(
 /// Gives surfaces that do not matter the sides of these values; whether one of them is another than before.
 fn set_sides_of_inactive(at: &Point, mode: &mut Mode, h: &[f64]) -> bool {
     let mut is_new = false;
-    for (j, h) in h.iter().enumerate() {
+    let inactive = h.iter().zip(at.arrival.active).enumerate();
+    for (j, (h, _)) in inactive.filter(|(_, (_, is_active))| !**is_active) {
         let side = if *h < 0.0 { -1 } else { 1 };
-        if !at.arrival.active[j] && *h != 0.0 && mode.entries()[j] != side {
+        if *h != 0.0 && mode.entries()[j] != side {
             mode.set(j, side);
             is_new = true;
         }
@@ -129,11 +130,12 @@ pub(crate) fn add_vanishing_surfaces(
     h: &[f64],
 ) -> Result<(), FieldError> {
     let arrival = at.arrival;
-    for (j, h) in h.iter().enumerate() {
+    for j in arrival.near() {
+        let h = h[j];
         // A surface that the motion rests on while it slides is in the place of one that it slides on.
         let slides = arrival.mode.entries()[j] == 0
             || !arrival.sliding.is_empty() && arrival.resting.contains(&j);
-        if !arrival.active[j] || slides || arrival.is_away(j) || surfaces.contains(&j) {
+        if slides || surfaces.contains(&j) {
             continue;
         }
         let size = at.system.surface_size(j, &at.place(arrival.signs))?;

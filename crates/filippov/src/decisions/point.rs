@@ -111,10 +111,14 @@ pub(crate) struct Arrival<'p, 'a> {
     pub field: RefCell<&'p mut ModeField<'a>>,
 }
 
-impl Arrival<'_, '_> {
-    /// Is a surface proved to be away from here?
-    pub fn is_away(&self, j: usize) -> bool {
-        self.asleep.is_some_and(|asleep| asleep.is_proved(j))
+impl<'p> Arrival<'p, '_> {
+    /// The surfaces that matter and are not proved to be away from here.
+    pub fn near(&self) -> impl Iterator<Item = usize> + 'p {
+        let asleep = self.asleep;
+        let is_away = move |j: usize| asleep.is_some_and(|asleep| asleep.is_proved(j));
+        let all = self.active.iter().enumerate();
+        all.filter(move |(j, is_active)| **is_active && !is_away(*j))
+            .map(|(j, _)| j)
     }
 
     /// The multipliers of the motion at the last evaluation of its field.

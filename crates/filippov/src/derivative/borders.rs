@@ -169,7 +169,7 @@ fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, Fie
 
 /// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces
 /// that the motion leaves where the field jumps, or does not leave where its derivative jumps; those that it slides on, if the way there
-/// has sides; and those at which another one of them has a kink. Behind them those that it does not leave and that have no sides here.
+/// has sides, as across another one; and those at which another one of them has a kink. Behind them those that it does not leave and that have no sides here.
 fn surfaces_with_sides(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
@@ -215,6 +215,11 @@ fn surfaces_with_sides(
     }
     let mut all: Vec<usize> = found.iter().map(|(j, _)| *j).collect();
     for k in others {
+        // A place beside all of them comes to a surface slid on across the others, or not.
+        if !found.is_empty() && piece.sliding.contains(&k) {
+            all.push(k);
+            continue;
+        }
         let side = piece.signs[k];
         piece.signs[k] = -side;
         let mut has_kink = false;

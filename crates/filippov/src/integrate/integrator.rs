@@ -69,7 +69,8 @@ impl<'a> Integrator<'a> {
         } = problem;
         check(&problem)?;
         let n = system.n_states();
-        let run = Run::new(system, options, actions, (t_span.0, y0));
+        let mut run = Run::new(system, options, actions, (t_span.0, y0));
+        run.motion.look_around(system, t_span.0, y0);
         Ok(Integrator {
             t_end: t_span.1,
             held,

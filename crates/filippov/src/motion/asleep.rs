@@ -82,20 +82,6 @@ impl Asleep {
         Some(awake)
     }
 
-    /// The same where a run starts that has looked around nowhere yet.
-    pub fn curved_awake_at(
-        &self,
-        system: &dyn PiecewiseSystem,
-        (t, x, q): (f64, &[f64], &[f64]),
-    ) -> Option<SmallVec<[usize; 4]>> {
-        if !self.is_used {
-            return None;
-        }
-        let mut asleep = self.clone();
-        asleep.look_around(system, t, x, q);
-        asleep.curved_awake(system)
-    }
-
     /// Wakes all for good: where the field ends at its surfaces, their distance limits the steps.
     pub fn end(&mut self) {
         *self = Asleep::default();

@@ -19,8 +19,7 @@ impl Taylor {
     /// that are asleep at the start.
     pub(super) fn of_run(start: &Run, span: f64) -> Self {
         let (system, options, motion) = (start.system, start.options, &start.motion);
-        let place = (start.t, &start.x[..], &motion.discrete[..]);
-        let awake = motion.asleep.curved_awake_at(system, place);
+        let awake = motion.asleep.curved_awake(system);
         let operations = |order| {
             let jets = system.motion_jets_of(&[], awake.as_deref(), order);
             Some(jets?.operations())

@@ -173,7 +173,7 @@ pub const FEWEST_ASLEEP: usize = 8;
 
 /// The box in which functions are proved to keep their signs goes beyond where the motion has been by this share of the width of
 /// that, and of the size of the state: it is left a few times in a run.
-pub const BOX_GROWTH: f64 = 1.0;
+pub const BOX_GROWTH: f64 = 2.0;
 
 /// A function keeps its sign in the box if its least value there is this share of its largest: values within rounding count as zeros.
 pub const CLEAR_IN_BOX: f64 = 1e-6;
