@@ -179,7 +179,7 @@ def test_parameters_at_a_border_between_two_forms_of_the_function(fun: Any, p: f
 
 
 def test_surfaces_that_coincide_for_a_value_of_a_parameter() -> None:
-    """Both vanish at one time, found as the zero of one: a parameter moves that alone, and the order counts."""
+    """Both vanish at one time, and one is located: a parameter moves that alone, and the order counts."""
 
     def fun(t: float, x: Any, p: float) -> Any:
         level = np.exp(x[2]) - 1 + 0.1 * x[1]
@@ -194,9 +194,7 @@ def test_surfaces_that_coincide_for_a_value_of_a_parameter() -> None:
     slopes = np.array([(ends[0] - ends[1]) / 1e-5, (ends[1] - ends[2]) / 1e-5])
     assert np.max(np.abs(slopes[0] - slopes[1])) > 1e-3
     # Where no order counts the derivative is known: each moves its own state.
-    apart = fl.System(
-        lambda t, x, p: [1.0 * (x[2] < 0.5), 1.0 * (x[2] < p), 1.0], n=3, params={"p": 0.5}
-    )
+    apart = fl.System(lambda t, x, p: [1.0 * (x[2] < 0.5), 1.0 * (x[2] < p), 1.0], n=3, params={"p": 0.5})
     known = apart.solve((0, 1), [0.0, 0.0, 0.0], wrt=["p"])
     np.testing.assert_allclose(known.derivative()[:, 0], [0.0, 1.0, 0.0], atol=1e-12)
     assert not known.warnings

@@ -277,9 +277,10 @@ def _actions(
     t0: float,
     y0: Array,
 ) -> tuple[tuple[CoreAction, ...], bool, tuple[str, ...]]:
-    """Return the resets for the core, traced if possible; whether they hold for these values only; borders."""
+    """Return the resets for the core, traced if possible; if they are for these values only; and borders."""
     surfaces = iter(triggers)
-    actions, is_pinned, borders = [], False, ()
+    actions, is_pinned = [], False
+    borders: tuple[str, ...] = ()
     discrete = source.discrete
     start = np.append(y0, [values[name] for name in discrete])
     for k, reset in enumerate(source.resets):

@@ -153,7 +153,11 @@ impl HeldMotions {
         let (by_state, by_parameters) = found.derivative.split_at(n * n);
         let [at_start, at_end] = &found.velocities;
         // The motion that starts later starts farther back.
-        let back = |r: usize| (0..n).map(|c| by_state[c * n + r] * at_start[c]).sum::<f64>();
+        let back = |r: usize| {
+            (0..n)
+                .map(|c| by_state[c * n + r] * at_start[c])
+                .sum::<f64>()
+        };
         let row = |r: usize| {
             let entries = |columns: &[f64]| columns.iter().skip(r).step_by(n).copied().collect();
             let (states, parameters): (Vec<f64>, Vec<f64>) =

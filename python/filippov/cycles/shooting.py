@@ -64,7 +64,7 @@ class Passage(NamedTuple):
     discrete: tuple[float, ...]
 
     def derivatives(self) -> Array:
-        """Return the derivatives of the state behind the end; in a last row, those of the equation of the end.
+        """Return the derivatives of the state behind the end, and in a last row those of the equation there.
 
         Their columns are by the state at the start, the time there, the duration, and the parameters.
         """
@@ -285,7 +285,7 @@ class Shooting:
         return Passage(t, found, value, row, after, derivative, discrete)
 
     def _at_time(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
-        """Return the equation of an end at a known time, and its derivatives by time, state and parameters."""
+        """Return the equation of an end at a known time, and its derivatives by time, state, parameters."""
         n, k = self.n, len(self.motions.by)
         if ending.cuts:
             return 0.0, np.eye(1, 1 + n + k)[0]

@@ -267,7 +267,10 @@ impl Instant<'_, '_> {
         for j in self.passed_with_it()? {
             let own = self.before.gradient_of(Guard::Surface(j), t, &z)?;
             let rate = own.time + dot(&own.state, self.record.field[0]);
-            let size = own.state.iter().fold(rate.abs(), |most, g| most.max(g.abs()));
+            let size = own
+                .state
+                .iter()
+                .fold(rate.abs(), |most, g| most.max(g.abs()));
             let mut entries = own.state.iter().zip(time);
             if entries.any(|(g, time)| (g + rate * time).abs() > AT_SIDE * size) {
                 return Ok(true);
