@@ -209,3 +209,17 @@ def test_a_start_on_a_surface_slid_on_and_on_one_that_is_left() -> None:
     with pytest.warns(fl.FilippovWarning, match="starts on"):
         sol = fl.System(fun, n=2).solve((0, 1), [0.0, 0.0], wrt="y0")
     assert len(sol.warnings[0].surfaces) == 2
+
+
+def test_a_start_at_rest_on_a_surface_where_the_field_of_one_side_vanishes() -> None:
+    """The multiplier stays at 1: a changed run leaves the surface, or slides along it, so that there are more sides than two."""
+
+    def fun(t: float, x: Any) -> Any:
+        above = x[0] + 0.4 * x[1] > 0
+        return [-x[0] - 1.4 * x[1] + (0 if above else 0.3), -1.4 * x[0] - 0.5 * x[1] - (0 if above else 0.1)]
+
+    with pytest.warns(fl.FilippovWarning, match="a multiplier stays at its end"):
+        sol = fl.System(fun, n=2).solve((0, 1), [0.0, 0.0], wrt="y0")
+    assert [warning.code for warning in sol.warnings] == ["one_sided", "one_sided"]
+    with pytest.warns(fl.FilippovWarning, match="a multiplier stays at its end"):
+        fl.gradient(fl.System(fun, n=2), (0, 1), [0.0, 0.0], terminal=lambda t, y: y[0], wrt="y0")

@@ -42,7 +42,7 @@ _Array = npt.NDArray[np.float64]
 
 __version__: str
 
-_Borders = tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool]
+_Borders = tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool, bool]
 _Guard = tuple[str, int, int]
 _Instant = tuple[list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]]
 

@@ -653,8 +653,9 @@ _WHY_SECOND_LOST = {
 _MOVED = "the start and by parameters that move the threshold"
 
 # The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
-# action, or a tick, is at its start, and a switch at its end.
-Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool]"
+# action, a tick, the threshold of a law, or a multiplier that stays at its end is at its start, and a switch
+# at its end.
+Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool, bool]"
 
 
 class Border(NamedTuple):
@@ -671,7 +672,7 @@ def borders_of(
     found: Borders, ends_at_given_time: bool, names: Sequence[str], conditions: Sequence[str]
 ) -> list[Border]:
     """Return where the derivatives of a run are those of one side, from what the core and the trace found."""
-    starts_on, lands_on, starts_at_action, starts_at_tick, starts_at_threshold, ends_at_instant = found
+    starts_on, lands_on, at_action, at_tick, at_threshold, at_multiplier_end, ends_at_instant = found
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
     if left:
@@ -681,11 +682,13 @@ def borders_of(
         met = tuple(names[j] for j in surfaces if j < len(names))
         what = f"is put on {', '.join(met)} = 0 by an action at t = {t:.10g}"
         borders.append(Border(what, "by what moves it off", met, t))
-    if starts_at_action:
+    if at_action:
         borders.append(Border("starts at the very time of an action", "by the initial time"))
-    if starts_at_tick:
+    if at_tick:
         borders.append(Border("starts at the very time of a tick", "by the start"))
-    if starts_at_threshold:
+    if at_multiplier_end:
+        borders.append(Border("starts where a multiplier stays at its end", "by the start and by parameters"))
+    if at_threshold:
         borders.append(Border("starts at the threshold of a law", f"by {_MOVED}"))
     borders += (Border(f"has parameters at the border {text}", "by these") for text in conditions)
     if ends_at_instant and ends_at_given_time:

@@ -41,11 +41,13 @@ pub type SideRow<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial time, does a clock tick there, and does the run end at an
-/// instant that moves?
+/// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial
+/// time, does a clock tick there, is a law at its threshold, does a multiplier stay at its end there, and does the run end at an instant
+/// that moves?
 pub type BordersRow = (
     Vec<usize>,
     Option<(f64, Vec<usize>)>,
+    bool,
     bool,
     bool,
     bool,
@@ -60,6 +62,7 @@ pub fn borders_row(borders: &Borders) -> BordersRow {
         borders.starts_at_action,
         borders.starts_at_tick,
         borders.starts_at_threshold,
+        borders.starts_at_end,
         borders.ends_at_instant,
     )
 }

@@ -78,12 +78,11 @@ enum Numbers {
     All,
 }
 
-/// Whether a region has its edges.
-#[derive(Clone, Copy, PartialEq)]
-enum Edges {
-    Open,
-    Closed,
-}
+/// Parameters that differ by this share are as near as one likes.
+const BESIDE: f64 = 1e-9;
+
+/// Multiples of it have fractions that differ.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// In questions about the field that many combinations of other signs are looked at.
 const MOST_COMBINATIONS: usize = 256;
@@ -155,7 +154,7 @@ impl Regions {
         for at in (0..kept.len()).rev() {
             let mut flipped = kept.clone();
             flipped[at].1 = -flipped[at].1;
-            if !self.is_solvable(&flipped, &[], Numbers::All, Edges::Open) {
+            if !self.is_solvable(&flipped, &[], Numbers::All) {
                 kept.remove(at);
             }
         }
@@ -326,18 +325,34 @@ impl Regions {
         let possible = self.possible(signs, also);
         if possible == Possible::NotForParameters {
             self.used_parameters = true;
-            self.is_at_border |= self.is_possible_with(signs, also, Numbers::All, Edges::Closed);
+            self.is_at_border = self.is_at_border || self.is_possible_beside(signs, also);
         }
         possible == Possible::Yes
     }
 
+    /// Whether there may be a point with these signs for parameters a little beside their values, in one of four directions.
+    fn is_possible_beside(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> bool {
+        let given = self.parameters.clone();
+        let ways = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let is_possible = ways.into_iter().any(|(way, odd)| {
+            let moved = given.iter().enumerate().map(|(k, value)| {
+                // No two parameters by the same share.
+                let share = way * (1.0 + (k as f64 * GOLDEN).fract());
+                let share = if k % 2 == 1 { odd * share } else { share };
+                value + BESIDE * share * (1.0 + value.abs())
+            });
+            self.parameters = moved.collect();
+            self.is_possible_with(signs, also, Numbers::All)
+        });
+        self.parameters = given;
+        is_possible
+    }
+
     /// Whether there may be a point with these signs, at which moreover side * value > 0 (side 0: value = 0).
     fn possible(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> Possible {
-        if !self.is_possible_with(signs, also, Numbers::Constants, Edges::Open) {
+        if !self.is_possible_with(signs, also, Numbers::Constants) {
             Possible::Never
-        } else if self.parameters.is_empty()
-            || self.is_possible_with(signs, also, Numbers::All, Edges::Open)
-        {
+        } else if self.parameters.is_empty() || self.is_possible_with(signs, also, Numbers::All) {
             Possible::Yes
         } else {
             Possible::NotForParameters
@@ -349,7 +364,6 @@ impl Regions {
         signs: &[Option<f64>],
         also: Option<(NodeId, f64)>,
         numbers: Numbers,
-        edges: Edges,
     ) -> bool {
         let mut sides = Vec::new();
         for (k, sign) in (0..).zip(signs) {
@@ -362,17 +376,11 @@ impl Regions {
         }
         let known = self.graph.not_negative.clone();
         let known = self.graph.at_signs(&known, signs);
-        self.is_solvable(&sides, &known, numbers, edges)
+        self.is_solvable(&sides, &known, numbers)
     }
 
     /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0), where the known values are not negative.
-    fn is_solvable(
-        &mut self,
-        sides: &[(NodeId, f64)],
-        known: &[NodeId],
-        numbers: Numbers,
-        edges: Edges,
-    ) -> bool {
+    fn is_solvable(&mut self, sides: &[(NodeId, f64)], known: &[NodeId], numbers: Numbers) -> bool {
         let mut rows = Vec::new();
         for &(mut function, side) in sides {
             if numbers == Numbers::All {
@@ -382,7 +390,7 @@ impl Regions {
             if side == 0.0 {
                 rows.extend([1.0, -1.0].map(|side| Inequality::new(&form, side, false)));
             } else if !form.is_zero() {
-                rows.push(Inequality::new(&form, side, edges == Edges::Open));
+                rows.push(Inequality::new(&form, side, true));
             }
         }
         let mut atoms: Vec<NodeId> = rows.iter().flat_map(Inequality::atoms).collect();

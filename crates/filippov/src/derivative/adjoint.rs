@@ -9,8 +9,8 @@ use std::cell::RefCell;
 
 use super::between::{state_at, EventGradient};
 use super::borders::{
-    differ, is_missed_later, starts_at_threshold, surfaces_at_start, surfaces_landed_on,
-    ticks_at_start, Borders,
+    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
+    surfaces_landed_on, ticks_at_start, Borders,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -356,6 +356,7 @@ impl<'w> Walk<'w> {
             let borders = &mut found.borders;
             let at = (start.t, &z[..]);
             borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?.0;
+            borders.starts_at_end = starts_at_end(&mut piece, at, &borders.starts_on)?;
             borders.starts_at_threshold = starts_at_threshold(&piece, at, kinds)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
             found.by_start = -dot(&found.by_state, &field);

@@ -16,6 +16,8 @@ pub struct Borders {
     pub starts_on: Vec<usize>,
     /// The first time at which an action puts the state on surfaces at which the sides differ, and these: all derivatives from there.
     pub lands_on: Option<(f64, Vec<usize>)>,
+    /// The multiplier of such a surface stays at its end at the start: a changed run slides, or leaves the surface.
+    pub starts_at_end: bool,
     /// An action at the initial time, which a run that begins later misses: derivatives by the initial time.
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
@@ -95,6 +97,16 @@ pub(super) fn surfaces_at_start(
         .map(|(kind, column)| (later(kind), column.clone()))
         .collect();
     surfaces_with_sides(piece, at, &moved)
+}
+
+/// Does the multiplier of a surface slid on, at which the sides differ, stay at its end at the start?
+pub(super) fn starts_at_end(
+    piece: &mut Piece,
+    (t, z): (f64, &[f64]),
+    starts_on: &[usize],
+) -> Result<bool, FieldError> {
+    let slides_on_one = starts_on.iter().any(|j| piece.sliding.contains(j));
+    Ok(slides_on_one && piece.stays_at_an_end(t, z)?)
 }
 
 /// A surface on which a run stays by itself, as one at rest does, and the sides of it to which the columns lead: 0 if they were on it

@@ -246,19 +246,19 @@ impl Instant<'_, '_> {
             let (before, after) = (entries[0][*j], entries[1][*j]);
             before != 0 && before != after && !record.guards.contains(&Guard::Surface(*j))
         };
-        let mut passed: Vec<usize> = (0..entries[0].len()).filter(is_passed).collect();
+        let passed: Vec<usize> = (0..entries[0].len()).filter(is_passed).collect();
         if !record.acts.is_empty() || passed.is_empty() {
             return Ok(Vec::new());
         }
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
         let (h, place) = (self.before.surfaces(t, &z)?, self.before.at(t, &z));
-        let mut near = Vec::with_capacity(passed.len());
-        for &j in &passed {
-            near.push(h[j].abs() <= AT_SIDE * self.extended.system.surface_size(j, &place)?);
+        let mut found = Vec::new();
+        for j in passed {
+            if h[j].abs() <= AT_SIDE * self.extended.system.surface_size(j, &place)? {
+                found.push(j);
+            }
         }
-        let mut near = near.into_iter();
-        passed.retain(|_| near.next() == Some(true));
-        Ok(passed)
+        Ok(found)
     }
 
     /// Does a changed motion pass some of them at another time than this?

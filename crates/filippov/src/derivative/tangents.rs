@@ -1,8 +1,8 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{
-    differ, is_missed_later, starts_at_threshold, surfaces_at_start, surfaces_landed_on,
-    ticks_at_start, Borders, Kept,
+    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
+    surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -224,6 +224,7 @@ impl<'a> Tangents<'a> {
         self.kept_on = Kept::all(&starts_on, self.kinds.len(), true);
         let quiet = Kept::all(&stays_on, self.kinds.len(), false);
         self.kept_on.extend(quiet);
+        borders.starts_at_end = starts_at_end(&mut piece, (t, &z), &starts_on)?;
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
