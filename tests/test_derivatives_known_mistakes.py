@@ -212,7 +212,7 @@ def test_a_start_on_a_surface_slid_on_and_on_one_that_is_left() -> None:
 
 
 def test_a_start_at_rest_on_a_surface_where_the_field_of_one_side_vanishes() -> None:
-    """The multiplier stays at 1: a changed run leaves the surface, or slides. There are more sides than two."""
+    """The multiplier stays at 1: a changed run leaves the surface, or slides. There are several sides."""
 
     def fun(t: float, x: Any) -> Any:
         u = 0.8 * np.sin(x[1]) if np.exp(x[0]) - 1 + 0.42 * x[1] > 0 else 0.01
