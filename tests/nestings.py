@@ -11,6 +11,7 @@ import argparse
 import multiprocessing
 import os
 import random
+import re
 import warnings
 from collections import Counter
 from collections.abc import Callable
@@ -19,7 +20,7 @@ from typing import Any, NamedTuple
 import filippov as fl
 import numpy as np
 
-__all__ = ["METHODS", "Outcome", "check", "check_event", "run_many", "source_of"]
+__all__ = ["METHODS", "Outcome", "check", "check_event", "check_parameters", "run_many", "source_of"]
 
 AFFINE = ["x[0]", "x[1]", "(x[0] - 0.5)", "(x[1] + 0.25)", "(x[0] - x[1])", "t", "(2*x[0] - 1)"]
 NUMBERS = ["0.0", "0.5", "1.0", "-0.75", "2.0", "-1.0"]
@@ -201,6 +202,49 @@ def check_event(seed: int) -> Outcome:
     if wrong.size:
         t = GRID[known[wrong[0]]]
         return Outcome("different", f"behind t = {t:.9g}: {np.diff(counts)[wrong[0]]} zeros; {method}")
+    return Outcome("same")
+
+
+def check_parameters(seed: int) -> Outcome:
+    """Compare a function that was traced for other values of two parameters with one of numbers instead."""
+    text = source_of(seed).partition("return ")[2].strip()
+    pick = random.Random(seed)
+    numbers = list(re.finditer(r"\d+\.\d+", text))
+    if len(numbers) < 2:
+        return Outcome("refused", "no numbers")
+    named, plain = text, text
+    first, other = {}, {}
+    for name, number in zip(
+        ("p", "q"), sorted(pick.sample(range(len(numbers)), 2), reverse=True), strict=True
+    ):
+        start, end = numbers[number].span()
+        value = float(text[start:end])
+        first[name] = value
+        other[name] = pick.choice([-value, value - 0.5, value + 0.25, value + 1.0, 2 * value, 0.0])
+        named = f"{named[:start]}{name}{named[end:]}"
+        plain = f"{plain[:start]}({other[name]}){plain[end:]}"
+    names = {"np": np}
+    with_parameters = eval(f"lambda t, x, p, q: [1.0, 0.5, 1.0 * {named}]", names)
+    without = eval(f"lambda t, x: [1.0, 0.5, 1.0 * {plain}]", names)
+    y0 = [pick.uniform(-2.0, 1.0), pick.uniform(-1.5, 1.0), 0.0]
+    options: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9, "max_steps": 5000}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            system = fl.System(with_parameters, n=3, params=first)
+            system.solve((0.0, STEP), y0)
+            found = system.solve((0.0, END), y0, other, **options)
+            expected = fl.solve_ivp(without, (0.0, END), y0, **options)
+    except (fl.TraceError, fl.ModelError) as error:
+        return Outcome("refused", str(error).partition("\n")[0][:150])
+    if not found.success or not expected.success:
+        return Outcome("stopped" if found.success == expected.success else "different", found.message[:200])
+    ends = found.y[2, -1], expected.y[2, -1]
+    if abs(ends[0] - ends[1]) > 1e-6 * (1.0 + abs(ends[1])):
+        # A function that a factor makes zero everywhere has no sign, as a warning says.
+        if any(warning.code == "non_unique" for warning in found.warnings) and 0.0 in other.values():
+            return Outcome("warned", found.warnings[0].message[:150])
+        return Outcome("different", f"{named} for {other} after {first}: {ends[0]:.6g}, not {ends[1]:.6g}")
     return Outcome("same")
 
 
