@@ -15,7 +15,7 @@ use super::borders::{
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
-use super::instant::{arrival, Instant, Passage, Weights};
+use super::instant::{arrival, brought_by, Instant, Passage, Weights};
 use super::limit::{is_like, Shares, MOST_REMEMBERED};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
@@ -347,7 +347,9 @@ impl<'w> Walk<'w> {
             let z = extended.state(&start.x);
             let field = piece.rates(start.t, &z)?;
             let columns = extended.columns_at_start(kinds, &field);
+            let mut arrived = columns.clone();
             if let Some(arrival) = arrival(&piece, start.t, &z)? {
+                brought_by(&arrival, n, &mut arrived);
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 arrival.pull_back(n, &mut whole);
                 found.by_parameters = whole.split_off(n);
@@ -356,7 +358,7 @@ impl<'w> Walk<'w> {
             let borders = &mut found.borders;
             let at = (start.t, &z[..]);
             borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?.0;
-            borders.starts_at_end = starts_at_end(&mut piece, at, &borders.starts_on)?;
+            borders.starts_at_end = starts_at_end(&mut piece, at, &borders.starts_on, &arrived)?;
             borders.starts_at_threshold = starts_at_threshold(&piece, at, kinds)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
             found.by_start = -dot(&found.by_state, &field);

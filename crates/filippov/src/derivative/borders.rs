@@ -16,7 +16,7 @@ pub struct Borders {
     pub starts_on: Vec<usize>,
     /// The first time at which an action puts the state on surfaces at which the sides differ, and these: all derivatives from there.
     pub lands_on: Option<(f64, Vec<usize>)>,
-    /// The multiplier of such a surface stays at its end at the start: a changed run slides, or leaves the surface.
+    /// The multiplier of such a surface stays at its end at the start, and a changed run slides, or leaves the surface.
     pub starts_at_end: bool,
     /// An action at the initial time, which a run that begins later misses: derivatives by the initial time.
     pub starts_at_action: bool,
@@ -99,14 +99,29 @@ pub(super) fn surfaces_at_start(
     surfaces_with_sides(piece, at, &moved)
 }
 
-/// Does the multiplier of a surface slid on, at which the sides differ, stay at its end at the start?
+/// Does the multiplier of a surface slid on, at which the sides differ, stay at its end at the start, and change with one of these
+/// columns that have come to the surface?
 pub(super) fn starts_at_end(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
     starts_on: &[usize],
+    columns: &[Vec<f64>],
 ) -> Result<bool, FieldError> {
-    let slides_on_one = starts_on.iter().any(|j| piece.sliding.contains(j));
-    Ok(slides_on_one && piece.stays_at_an_end(t, z)?)
+    let mut slid_on = starts_on.iter().filter(|j| piece.sliding.contains(j));
+    let Some(&j) = slid_on.next() else {
+        return Ok(false);
+    };
+    if !piece.stays_at_an_end(t, z)? {
+        return Ok(false);
+    }
+    let Some((_, slopes)) = piece.multiplier_slopes(j, t, z)? else {
+        return Ok(false);
+    };
+    let changes = |column: &Vec<f64>| {
+        let terms = slopes.iter().zip(column).map(|(s, v)| (s * v).abs());
+        dot(&slopes, column).abs() > AT_SIDE * terms.sum::<f64>()
+    };
+    Ok(columns.iter().any(changes))
 }
 
 /// A surface on which a run stays by itself, as one at rest does, and the sides of it to which the columns lead: 0 if they were on it

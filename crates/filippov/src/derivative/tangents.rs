@@ -224,7 +224,7 @@ impl<'a> Tangents<'a> {
         self.kept_on = Kept::all(&starts_on, self.kinds.len(), true);
         let quiet = Kept::all(&stays_on, self.kinds.len(), false);
         self.kept_on.extend(quiet);
-        borders.starts_at_end = starts_at_end(&mut piece, (t, &z), &starts_on)?;
+        borders.starts_at_end = starts_at_end(&mut piece, (t, &z), &starts_on, &self.columns)?;
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
