@@ -202,10 +202,10 @@ def _slope(function: Callable[[float], Array], d: float) -> Array:
     return np.asarray(1.5 * near - 0.6 * middle + 0.1 * far)
 
 
-def _difference(motions: Motions, period: float, count: int = _PLACES) -> Array:
+def _difference(motions: Motions, period: float) -> Array:
     """Return the differences of field and switching functions over one period, at several places."""
     parts = []
-    for u, x, signs in _samples(motions)[:count]:
+    for u, x, signs in _samples(motions):
         t = u * period
         parts.append(motions.right_hand_side(t + period, x, signs) - motions.right_hand_side(t, x, signs))
     found = np.concatenate(parts)
@@ -244,8 +244,8 @@ def _repeats(motions: Motions, period: float) -> bool:
     return bool(np.max(left, initial=0.0, where=np.isfinite(left)) <= 1e-11 * size)
 
 
-def _size(motions: Motions, count: int = _PLACES) -> float:
-    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)[:count]]
+def _size(motions: Motions) -> float:
+    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)]
     found = np.abs(np.concatenate(values))
     return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
 

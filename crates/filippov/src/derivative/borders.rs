@@ -196,7 +196,8 @@ fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, Fie
 
 /// The surfaces through a place at which the sides differ, if one of these changes of its time and state moves it off them: surfaces
 /// that the motion leaves where the field jumps, or does not leave where its derivative jumps; those that it slides on, if the way there
-/// has sides, as across another one; and those at which another one of them has a kink. Behind them those that it does not leave and that have no sides here.
+/// has sides, as across another one; and those at which another one of them has a kink. Behind them those that it does not leave and
+/// that have no sides here.
 fn surfaces_with_sides(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
