@@ -12,11 +12,13 @@ import numpy as np
 from filippov.cycles.motions import Array
 from filippov.errors import ModelError
 
-__all__ = ["Curve", "Step", "corrected", "tangent_of"]
+__all__ = ["Curve", "Place", "Step", "corrected", "cubic_through", "place_of", "tangent_of"]
 
 _TOLERANCE = 1e-11
 _MOST_STEPS = 12
 _ABSURD, _NEAR = 1e4, 1e-7
+# A cubic leads twice as far as its two points are apart, if the cosine between their directions is as large.
+_FAR, _ALONG = 2.0, 0.5
 
 
 class Curve(Protocol):
@@ -35,6 +37,22 @@ class Curve(Protocol):
 
     def scales(self, w: Array) -> Array:
         """Return the sizes by which the unknowns are measured."""
+
+
+class Place(NamedTuple):
+    """A point of a curve with its direction.
+
+    Attributes
+    ----------
+    w, scale : ndarray, shape (N + 1,)
+        The point, and the sizes by which its unknowns are measured.
+    tangent : ndarray, shape (N + 1,)
+        The direction in scaled unknowns, of length 1.
+    """
+
+    w: Array
+    scale: Array
+    tangent: Array
 
 
 class Step(NamedTuple):
@@ -71,6 +89,32 @@ def tangent_of(jacobian: Array, scale: Array, along: Array | None = None) -> Arr
     if along is not None and found @ along < 0:
         found = -found
     return np.asarray(found / np.linalg.norm(found))
+
+
+def place_of(curve: Curve, w: Array, jacobian: Array, along: Array | None = None) -> Place:
+    """Return a point of a curve with its direction, in the sense of another direction."""
+    scale = curve.scales(w)
+    return Place(w, scale, tangent_of(jacobian, scale, along))
+
+
+def cubic_through(here: Place, other: Place | None, ahead: float) -> Array:
+    """Return a guess at the point in the plane that is `ahead` of a place, in its scaled unknowns.
+
+    It is on the cubic through both places in their directions, and straight ahead if that is not known.
+    """
+    w, scale, tangent = here
+    straight = tangent * scale
+    guess = w + ahead * straight
+    if other is None:
+        return np.asarray(guess)
+    width = float((other.w - w) / scale @ tangent)
+    slope = other.tangent * other.scale
+    speed = float(slope / scale @ tangent)
+    if width == 0.0 or abs(ahead) > _FAR * abs(width) or speed < _ALONG * np.linalg.norm(slope / scale):
+        return np.asarray(guess)
+    chord, share = (other.w - w) / width - straight, ahead / width
+    bend = slope / speed - straight
+    return np.asarray(guess + ahead * share * ((3.0 - 2.0 * share) * chord + (share - 1.0) * bend))
 
 
 def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.arclength import Place, Step, corrected, cubic_through, place_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_of, in_parts
@@ -284,23 +284,21 @@ class _Position(NamedTuple):
     ----------
     curve : CycleCurve or EquilibriumCurve
         The equations of its itinerary.
-    w : ndarray
-        Unknowns and parameter.
-    tangent : ndarray
-        The direction, in scaled unknowns.
+    place : Place
+        Unknowns and parameter, and the direction.
     tests : dict
         The values of the test functions.
     """
 
     curve: AnyCurve
-    w: Array
-    tangent: Array
+    place: Place
     tests: dict[Any, float]
 
     def turned(self) -> _Position:
         """Return the same point, to be left in the other direction."""
         tests = {key: -value if key[0] in _TURNING else value for key, value in self.tests.items()}
-        return self._replace(tangent=-self.tangent, tests=tests)
+        place = self.place._replace(tangent=-self.place.tangent)
+        return self._replace(place=place, tests=tests)
 
 
 class _Side:
@@ -311,27 +309,30 @@ class _Side:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason, self.is_stopped = "interrupted", False
+        self.here: _Position
+        self.before: Place | None = None
         self._go_on(self._position(start, direction), start)
 
     def _position(self, state: State, direction: float) -> _Position:
         """Return the position of a state, from which the parameter goes in a direction."""
         curve, w = curve_of(state, (self.settings.name,), (self.settings.size,))
         _, jacobian = curve.equations(w)
-        tangent = tangent_of(jacobian, curve.scales(w))
-        if tangent[-1] * direction < 0:
-            tangent = -tangent
-        return _Position(curve, w, tangent, self._tests(curve, w, jacobian, tangent))
+        place = place_of(curve, w, jacobian)
+        if place.tangent[-1] * direction < 0:
+            place = place._replace(tangent=-place.tangent)
+        return self._position_at(curve, place, jacobian)
 
-    def _tests(self, curve: AnyCurve, w: Array, jacobian: Array, tangent: Array) -> dict[Any, float]:
-        found = tests_at(curve, w, jacobian, tangent)
+    def _position_at(self, curve: AnyCurve, place: Place, jacobian: Array) -> _Position:
+        tests = tests_at(curve, place, jacobian)
         for monitor in self.settings.monitors:
-            found["UZ", monitor.name] = monitor.value(curve.state(w, 0.0))
-        return found
+            tests["UZ", monitor.name] = monitor.value(curve.state(place.w, 0.0))
+        return _Position(curve, place, tests)
 
     def _go_on(self, position: _Position, state: State) -> None:
         """Take a position as the next point of the branch."""
+        self.before = self.here.place if self.points and self.here.curve is position.curve else None
         self.here = position
-        value = float(position.w[-1])
+        value = float(position.place.w[-1])
         self.points.append(Point({self.settings.name: value}, state, position.tests))
         if self.settings.bar is not None:
             self.settings.bar.add({self.settings.name: value})
@@ -343,7 +344,7 @@ class _Side:
         ds = self.settings.step
         while len(self.points) < self.settings.most:
             if self._is_at_end():
-                self.reason = f"{self.settings.name} = {self.here.w[-1]:g} is the end of the range"
+                self.reason = f"{self.settings.name} = {self.here.place.w[-1]:g} is the end of the range"
                 self._add("EP", None, self.here.curve, self.points[-1].state)
                 return
             n_special, curve = len(self.special), self.here.curve
@@ -419,7 +420,7 @@ class _Side:
         first, last = self.points[0].state, self.points[-1].state
         if not isinstance(first, Cycle) or not isinstance(last, Cycle):
             return False
-        name, value = self.settings.name, float(self.here.w[-1])
+        name, value = self.settings.name, float(self.here.place.w[-1])
         starts = (np.max(np.abs(np.array(cycle.itinerary.starts))) for cycle in (first, last))
         grown = next(starts) * _UNBOUNDED < next(starts)
         if grown and _size_of(last) > _UNBOUNDED * _size_of(first):
@@ -443,27 +444,26 @@ class _Side:
 
     def _is_at_end(self) -> bool:
         """Whether the range ends here, and the branch does not lead into it."""
-        (low, high), value = self.settings.bounds, self.here.w[-1]
+        (low, high), value = self.settings.bounds, self.here.place.w[-1]
         if low < value < high:
             return False
         outward = -1.0 if value <= low else 1.0
-        return bool(self.here.tangent[-1] * outward > 0) or len(self.points) > 1
+        return bool(self.here.place.tangent[-1] * outward > 0) or len(self.points) > 1
 
     def _step(self, ds: float) -> tuple[Step, _Position]:
         """Return the next point, with its position."""
-        curve, w, tangent, _ = self.here
+        curve, here, _ = self.here
+        w, scale, tangent = here
         low, high = self.settings.bounds
-        scale = curve.scales(w)
-        step = corrected(curve, w + ds * tangent * scale, scale, tangent)
+        step = corrected(curve, cubic_through(here, self.before, ds), scale, tangent)
         if not low <= step.w[-1] <= high:
             bound = low if step.w[-1] < low else high
             share = (bound - w[-1]) / (step.w[-1] - w[-1])
             step = _at_parameter(curve, w + share * (step.w - w), bound, scale)
-        following = tangent_of(step.jacobian, curve.scales(step.w), tangent)
-        if following @ tangent < 0.8 and ds > 1e-4:
+        following = place_of(curve, step.w, step.jacobian, tangent)
+        if following.tangent @ tangent < 0.8 and ds > 1e-4:
             raise ModelError("the branch turns too far in one step")
-        tests = self._tests(curve, step.w, step.jacobian, following)
-        return step, _Position(curve, step.w, following, tests)
+        return step, self._position_at(curve, following, step.jacobian)
 
     def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
@@ -489,7 +489,7 @@ class _Side:
                 if self.settings.switch == "stop":
                     self.reason = f"{self.special[-1]!r}"
                     return False
-                return self._change(key, located, following.w)
+                return self._change(key, located, following.place.w)
             if _is_real(key, state):
                 self._add(key[0], key, curve, state)
         state = curve.state(step.w, step.error)
@@ -503,7 +503,7 @@ class _Side:
     def _finer(self, position: _Position, cycle: Cycle) -> _Position:
         """Return the position of a cycle divided into more parts, in the same direction along the branch."""
         finer = self._position(cycle, 1.0)
-        ways = [_summary(place.curve, place.w, place.tangent) for place in (position, finer)]
+        ways = [_summary(one.curve, one.place) for one in (position, finer)]
         return finer if ways[0] @ ways[1] > 0 else finer.turned()
 
     def _is_single_again(self, following: _Position) -> bool:
@@ -511,7 +511,7 @@ class _Side:
         curve = self.here.curve
         if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
             return False
-        halves = [_difference_of_halves(curve, place.w) for place in (self.here, following)]
+        halves = [_difference_of_halves(curve, one.place.w) for one in (self.here, following)]
         before, after = halves
         if before is None or after is None:
             return False
@@ -520,7 +520,7 @@ class _Side:
             return False
         self.reason = "the cycle comes back to one of half the period, followed twice"
         try:
-            there = single_at_doubling(curve, self.here.w, following.w)
+            there = single_at_doubling(curve, self.here.place.w, following.place.w)
         except ModelError:
             return True
         name, near = self.settings.name, 1e-6 * self.settings.size
@@ -536,16 +536,16 @@ class _Side:
 
     def _located(self, start: _Position, key: Any, end: _Position) -> tuple[float, Any, Step]:
         """Return how far along a step a test function vanishes, which one, and the point."""
-        curve, w, tangent, tests = start
-        scale = curve.scales(w)
+        curve, here, tests = start
+        w, scale, tangent = here
         level = float(w / scale @ tangent)
-        length = float(end.w / scale @ tangent) - level
+        length = float(end.place.w / scale @ tangent) - level
         nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
-            point = corrected(curve, w + (s / length) * (end.w - w), scale, tangent, level + s)
-            following = tangent_of(point.jacobian, curve.scales(point.w), tangent)
-            found = self._tests(curve, point.w, point.jacobian, following)
+            point = corrected(curve, cubic_through(here, end.place, s), scale, tangent, level + s)
+            following = place_of(curve, point.w, point.jacobian, tangent)
+            found = self._position_at(curve, following, point.jacobian).tests
             if key not in found:
                 raise ModelError(f"the test function of {key[0]} is lost on the way")
             if not nearest or abs(found[key]) <= nearest[0][0]:
@@ -603,19 +603,18 @@ class _Side:
 
     def _leg_vanishes_within(self, ds: float) -> bool:
         """Whether the next step would make the duration of a short leg zero or negative."""
-        curve, w, tangent, _ = self.here
+        curve, (w, scale, tangent), _ = self.here
         if not isinstance(curve, CycleCurve):
             return False
         own = slice(curve.shooting.m * curve.shooting.n, curve.shooting.m * (curve.shooting.n + 1))
-        now, then = (v[own] for v in (w, w + ds * tangent * curve.scales(w)))
+        now, then = (v[own] for v in (w, w + ds * tangent * scale))
         return bool(np.any((then <= 0) & (now < SHORT * np.sum(now))))
 
     def _goes_beyond_a_vanishing_leg(self, ds: float) -> bool:
         """Go on behind the point at which a leg vanishes, if there is one."""
-        curve, w, tangent, _ = self.here
+        curve, (w, scale, tangent), _ = self.here
         if not isinstance(curve, CycleCurve) or self.settings.switch == "ignore":
             return False
-        scale = curve.scales(w)
         direction = float(np.sign(tangent[-1])) or self.direction
         value = float(w[-1])
         for reach in (1.0, 2.0, 4.0):
@@ -636,9 +635,9 @@ class _Side:
 
     def _passes_to(self, new: Cycle, direction: float, ds: float) -> bool:
         """Go on with a cycle behind the point at which a leg of this one has no duration, as at a corner."""
-        curve, w, tangent, _ = self.here
+        curve, (w, scale, tangent), _ = self.here
         assert isinstance(curve, CycleCurve)
-        scale, first, m = curve.scales(w), curve.shooting.m * curve.shooting.n, curve.shooting.m
+        first, m = curve.shooting.m * curve.shooting.n, curve.shooting.m
         period = float(np.sum(w[first : first + m]))
         ahead = (w + 4.0 * ds * tangent * scale)[first : first + m]
         for k in np.flatnonzero(ahead <= 0):
@@ -653,7 +652,7 @@ class _Side:
             except ModelError:
                 continue
             key = min(values, key=lambda key: abs(values[key]), default=None)
-            is_between = (step.w[-1] - w[-1]) * (following.w[-1] - step.w[-1]) >= 0
+            is_between = (step.w[-1] - w[-1]) * (following.place.w[-1] - step.w[-1]) >= 0
             if key is None or abs(values[key]) > _VANISHES or not is_between:
                 continue
             self._add(key[0], key, curve, curve.state(step.w, step.error))
@@ -705,12 +704,11 @@ class _Side:
         ModelError
             If none does.
         """
-        curve, w, tangent, tests = start
-        scale = curve.scales(w)
+        curve, (w, scale, tangent), tests = start
         share = (value - w[-1]) / (tangent[-1] * scale[-1])
         step = _at_parameter(curve, w + share * tangent * scale, value, scale)
-        following = tangent_of(step.jacobian, curve.scales(step.w), tangent)
-        end = _Position(curve, step.w, following, self._tests(curve, step.w, step.jacobian, following))
+        following = place_of(curve, step.w, step.jacobian, tangent)
+        end = self._position_at(curve, following, step.jacobian)
         lost = [
             key for key in end.tests if key[0] in CHANGES and key in tests and end.tests[key] * tests[key] < 0
         ]
@@ -720,13 +718,14 @@ class _Side:
         self._add(key[0], key, curve, curve.state(there.w, there.error))
 
     def _why_it_ended(self, error: ModelError) -> str:
-        name, value = self.settings.name, float(self.here.w[-1])
+        name, value = self.settings.name, float(self.here.place.w[-1])
         return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
 
 
-def _summary(curve: AnyCurve, w: Array, tangent: Array) -> Array:
+def _summary(curve: AnyCurve, place: Place) -> Array:
     """Return the rates of the first state, the period and the parameter along a direction."""
     assert isinstance(curve, CycleCurve)
+    tangent = place.tangent
     n, m = curve.shooting.n, curve.shooting.m
     return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])
 
@@ -739,11 +738,10 @@ def _size_of(cycle: Cycle) -> float:
 def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
     """Return by how much the halves of a cycle differ, by its size; nothing if they are not alike."""
     shooting = curve.shooting
-    n, m = shooting.n, shooting.m
-    itinerary = shooting.itinerary(w[: curve.n_unknowns])
-    if m % 2 or not itinerary.is_closed_by_event():
+    n, m, legs = shooting.n, shooting.m, shooting.legs
+    if m % 2 or legs[-1].ending is None:
         return None
-    first, second = itinerary.legs[: m // 2], itinerary.legs[m // 2 :]
+    first, second = legs[: m // 2], legs[m // 2 :]
     if not all(a.is_alike(b) for a, b in zip(first, second, strict=True)):
         return None
     states = (w / curve.scales(w))[: m * n].reshape(2, -1)

@@ -239,9 +239,10 @@ def _repeats(motions: Motions, period: float) -> bool:
         np.concatenate([motions.right_hand_side(u * period + wait, x, signs) for u, x, signs in places])
         for wait in (0.0, period)
     )
-    left = np.abs(later - now)
-    size = np.max(np.abs(now), initial=1.0, where=np.isfinite(now))
-    return bool(np.max(left, initial=0.0, where=np.isfinite(left)) <= 1e-11 * size)
+    is_finite = np.isfinite(now) & np.isfinite(later)
+    now, later = now[is_finite], later[is_finite]
+    size = max(1.0, float(abs(now).max(initial=0.0)))
+    return bool(abs(later - now).max(initial=0.0) <= 1e-11 * size)
 
 
 def _size(motions: Motions) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from filippov.cycles.arclength import Place
 from filippov.cycles.cycle import multipliers_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.motions import Array
@@ -19,11 +20,9 @@ from filippov.cycles.shooting import Shot
 __all__ = ["singular_values_of", "tests_at"]
 
 
-def tests_at(
-    curve: CycleCurve | EquilibriumCurve, w: Array, jacobian: Array, tangent: Array
-) -> dict[Any, float]:
+def tests_at(curve: CycleCurve | EquilibriumCurve, place: Place, jacobian: Array) -> dict[Any, float]:
     """Return the test functions at a point of a branch, by keys whose first entry is the code."""
-    scale = curve.scales(w)
+    w, scale, tangent = place
     bordered = np.vstack([jacobian * scale, tangent])
     sign, size = np.linalg.slogdet(bordered)
     is_on_surface = isinstance(curve, EquilibriumCurve) and curve.sliding

@@ -49,8 +49,8 @@ class Passage(NamedTuple):
         The equation of its end, by the time, the state and the parameters; no row if nothing ends it.
     after : ndarray, shape (n,)
         The state behind the end.
-    map : ndarray, shape (n, 1 + n + k)
-        Its derivatives by the time, the state before, and the parameters.
+    map : ndarray of shape (n, 1 + n + k) or None
+        Its derivatives by the time, the state before, and the parameters; nothing if no action changes it.
     discrete : tuple of float
         The discrete states behind the end.
     """
@@ -60,20 +60,31 @@ class Passage(NamedTuple):
     value: float
     row: Array | None
     after: Array
-    map: Array
+    map: Array | None
     discrete: tuple[float, ...]
 
-    def derivatives(self) -> Array:
-        """Return the derivatives of the state behind the end, and in a last row those of the equation there.
+    def derivatives(self) -> tuple[Array, Array | None]:
+        """Return the derivatives of the state behind the end, and those of the equation there.
 
         Their columns are by the state at the start, the time there, the duration, and the parameters.
         """
-        n, state = len(self.after), self.leg.derivatives
-        rows = self.map if self.row is None else np.concatenate([self.map, self.row[None]])
-        found = rows[:, 1 : 1 + n] @ state
-        found[:, n : n + 2] += rows[:, :1]
-        found[:, n + 2 :] += rows[:, 1 + n :]
+        behind = self.leg.derivatives if self.map is None else self._along(self.map)
+        return behind, None if self.row is None else self._along(self.row)
+
+    def _along(self, rows: Array) -> Array:
+        """Return derivatives of what is a function of the end, by the columns of the leg."""
+        n = len(self.after)
+        found = rows[..., 1 : 1 + n] @ self.leg.derivatives
+        found[..., n : n + 2] += rows[..., :1]
+        found[..., n + 2 :] += rows[..., 1 + n :]
         return np.asarray(found)
+
+    def across(self, states: Array, time: Array) -> Array:
+        """Return changes of the state behind the end from those before, and from those of its time."""
+        moved = states + np.outer(self.leg.velocities[1], time)
+        if self.map is None:
+            return np.asarray(moved)
+        return np.asarray(self.map[:, 1 : 1 + len(self.after)] @ moved + np.outer(self.map[:, 0], time))
 
     def saltation(self, following: Array) -> Array:
         """Return the derivative of the state behind the end by that before, from the velocity behind."""
@@ -83,9 +94,7 @@ class Passage(NamedTuple):
         at_end, normal = self.leg.velocities[1], self.row[1 : 1 + n]
         with np.errstate(divide="ignore", invalid="ignore"):
             time = -normal / (self.row[0] + normal @ at_end)
-            states = np.eye(n) + np.outer(at_end, time)
-            moved = self.map[:, 1 : 1 + n] @ states + np.outer(self.map[:, 0], time)
-            return np.asarray(moved - np.outer(following, time))
+            return self.across(np.eye(n), time) - np.outer(following, time)
 
 
 class Shot(NamedTuple):
@@ -121,8 +130,7 @@ class Shot(NamedTuple):
                 return np.asarray(states)
             rate = passage.row[0] + passage.row[1 : 1 + n] @ at_end
             time = -(passage.row[1 : 1 + n] @ states) / rate
-            states = states + np.outer(at_end, time)
-            states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
+            states = passage.across(states, time)
         return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
 
     def across(self) -> Array | None:
@@ -244,14 +252,17 @@ class Shooting:
             following = (i + 1) % m
             residual[first:last] = passage.after - starts[following]
             residual[last] = passage.value
-            found = passage.derivatives()
-            own = jacobian[first : first + len(found)]
-            own[:, i * n : (i + 1) * n] = found[:, :n]
-            own[:, m * n : duration] = found[:, n : n + 1]
-            own[:, duration] = found[:, n + 1]
-            own[:, m * (n + 1) : size] = found[:, n : n + 1]
-            own[:, size:] = found[:, n + 2 :]
-            own[:n, following * n : (following + 1) * n] -= self._unit
+            for rows, found in zip(
+                (slice(first, last), slice(last, last + 1)), passage.derivatives(), strict=True
+            ):
+                if found is not None:
+                    own = jacobian[rows]
+                    own[..., i * n : (i + 1) * n] = found[..., :n]
+                    own[..., m * n : duration] = found[..., n : n + 1]
+                    own[..., duration] = found[..., n + 1]
+                    own[..., m * (n + 1) : size] = found[..., n : n + 1]
+                    own[..., size:] = found[..., n + 2 :]
+            jacobian[first:last, following * n : (following + 1) * n] -= self._unit
             if leg.is_cut:
                 jacobian[last] = 0.0
                 residual[last] = durations[i] - self._shares[i] * durations[i + 1]
@@ -271,14 +282,15 @@ class Shooting:
         n, k = self.n, len(self.motions.by)
         guard = None if leg.ending is None else leg.ending.guard
         found = self.motions.leg(leg.mode, leg.discrete, t0, x, duration, places, guard)
-        t, unit = t0 + duration, np.eye(n, 1 + n + k, 1)
+        t = t0 + duration
         if leg.ending is None:
-            return Passage(t, found, 0.0, None, found.x, unit, leg.discrete)
+            return Passage(t, found, 0.0, None, found.x, None, leg.discrete)
         value, row = found.ending or self._at_time(leg, leg.ending, t, found.x)
-        after, discrete, derivative = found.x, leg.discrete, unit
+        after, discrete, derivative = found.x, leg.discrete, None
         for index in leg.ending.acts:
             after, discrete, rows, by_time, _ = self.motions.act(index, leg.mode, discrete, t, after)
             if rows is not None:
+                derivative = np.eye(n, 1 + n + k, 1) if derivative is None else derivative
                 derivative = rows[:, :n] @ derivative
                 derivative[:, 0] += by_time
                 derivative[:, 1 + n :] += rows[:, n:]
