@@ -61,6 +61,23 @@ pub fn instant_row<'py>(py: Python<'py>, record: &InstantRecord) -> InstantRow<'
     )
 }
 
+/// The derivatives of a function of the end of a motion, by the states and the time at its start, its duration and the parameters.
+fn along(gradient: &Gradient, end: &[Vec<f64>]) -> Vec<f64> {
+    let n = end.len();
+    let (by_state, by_parameters) = gradient.state.split_at(n);
+    let itself = std::iter::repeat_n(&0.0, n)
+        .chain([&gradient.time; 2])
+        .chain(by_parameters);
+    let through = |column: usize| -> f64 {
+        let entries = by_state.iter().zip(end);
+        entries.map(|(entry, row)| entry * row[column]).sum()
+    };
+    itself
+        .enumerate()
+        .map(|(column, own)| own + through(column))
+        .collect()
+}
+
 fn by_time_and_state(gradient: &Gradient) -> Vec<f64> {
     [&[gradient.time], &gradient.state[..]].concat()
 }
@@ -99,7 +116,8 @@ impl HeldMotions {
 
     /// The motion over a time: the state at its end; its derivative by the states and the time at its start, its duration and the
     /// parameters; the velocities at both ends; times with the values of the guards there; and the guard of a number at its end,
-    /// with its derivatives by the time, the states and the parameters.
+    /// with its derivatives by the time, the states and the parameters. Its derivatives by what the motion depends on are then a
+    /// last row below those of the state.
     #[allow(clippy::type_complexity, clippy::too_many_arguments)]
     #[pyo3(signature = (mode, q, t0, x, t1, places=0, ending=None))]
     fn leg<'py>(
@@ -164,7 +182,10 @@ impl HeldMotions {
                 (entries(by_state), entries(by_parameters));
             [&states[..], &[at_end[r] - back(r), at_end[r]], &parameters].concat()
         };
-        let derivative: Vec<Vec<f64>> = (0..n).map(row).collect();
+        let mut derivative: Vec<Vec<f64>> = (0..n).map(row).collect();
+        if let Some(guard) = &found.ending {
+            derivative.push(along(&guard.gradient, &derivative));
+        }
         let times: Vec<f64> = found.samples.iter().map(|sample| sample.0).collect();
         let width = found.samples.first().map_or(0, |sample| sample.1.len());
         let values: Vec<f64> = found

@@ -15,6 +15,8 @@ from filippov.errors import ModelError
 __all__ = ["Curve", "Place", "Step", "corrected", "cubic_through", "place_of", "tangent_of"]
 
 _TOLERANCE = 1e-11
+# A step that short is not made; that before it is as long as the root of it.
+_ARRIVED, _NEXT_IS_LAST = 1e-12, 1e-6
 _MOST_STEPS = 12
 _ABSURD, _NEAR = 1e4, 1e-7
 # A cubic leads twice as far as its two points are apart, if the cosine between their directions is as large.
@@ -32,8 +34,11 @@ class Curve(Protocol):
 
     is_exact: bool
 
-    def equations(self, w: Array) -> tuple[Array, Array]:
-        """Return the equations, shape (N,), and their derivatives, shape (N, N + 1)."""
+    def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
+        """Return the equations, shape (N,), and their derivatives, shape (N, N + 1).
+
+        What is asked for at a point of the curve may be computed together with them, if they `may_be_last`.
+        """
 
     def scales(self, w: Array) -> Array:
         """Return the sizes by which the unknowns are measured."""
@@ -129,7 +134,7 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
     w = w.copy()
     before = np.inf
     for count in range(1, _MOST_STEPS + 1):
-        residual, jacobian = curve.equations(w)
+        residual, jacobian = curve.equations(w, before < _NEXT_IS_LAST)
         matrix = np.vstack([jacobian * scale, normal])
         right = np.append(residual, w / scale @ normal - plane)
         try:
@@ -139,6 +144,8 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
         size = float(np.max(np.abs(change)))
         if not size < _ABSURD:
             break
+        if size < _ARRIVED:
+            return Step(w, jacobian, count, size)
         w = w + change * scale
         # Newton's method squares what is left, once it is near.
         squares = curve.is_exact and size < _NEAR and size < 1e-2 * before < np.inf

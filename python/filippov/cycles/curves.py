@@ -125,8 +125,8 @@ class _Extended:
     def __init__(self, curve: AnyCurve, condition: _Condition) -> None:
         self.curve, self.condition = curve, condition
 
-    def equations(self, w: Array) -> tuple[Array, Array]:
-        residual, jacobian = self.curve.equations(w)
+    def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
+        residual, jacobian = self.curve.equations(w, may_be_last)
         value, gradient = self.condition.value(w), self.condition.gradient(w)
         return np.append(residual, value), np.vstack([jacobian, gradient])
 

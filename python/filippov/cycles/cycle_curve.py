@@ -41,15 +41,15 @@ class CycleCurve:
 
     def shot(self, w: Array, places: int = 0) -> Shot:
         """Return the equations of the cycle, those of the latest call again."""
+        u, p = w[: self.n_unknowns], w[self.n_unknowns :]
+        self._shooting.motions.move(p)
         if self._latest is None or self._latest[1] < places or not np.array_equal(self._latest[0], w):
-            u, p = w[: self.n_unknowns], w[self.n_unknowns :]
-            self._shooting.motions.move(p)
             self._latest = w.copy(), places, self._shooting.shoot(u, places)
         return self._latest[2]
 
-    def equations(self, w: Array) -> tuple[Array, Array]:
+    def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
         """Return the equations, and their derivatives by unknowns and parameters."""
-        shot = self.shot(w)
+        shot = self.shot(w, PLACES if may_be_last else 0)
         return shot.residual, shot.jacobian
 
     def scales(self, w: Array) -> Array:

@@ -48,8 +48,9 @@ class LegEnd(NamedTuple):
     ----------
     x : ndarray, shape (n,)
         The state at the end.
-    derivatives : ndarray, shape (n, n + 2 + k)
-        Its derivatives by the state and the time at the start, by the duration and by the parameters.
+    derivatives : ndarray, shape (n, n + 2 + k) or (n + 1, n + 2 + k)
+        Its derivatives by the state and the time at the start, by the duration and by the parameters; in a
+        last row those of the guard asked for at the end.
     velocities : (ndarray, ndarray)
         The velocities at both ends.
     times, guards : ndarray, shape (m,) and (g, m)
@@ -68,7 +69,8 @@ class LegEnd(NamedTuple):
     @property
     def by_state(self) -> Array:
         """The derivative by the state at the start, (n, n)."""
-        return self.derivatives[:, : len(self.x)]
+        n = len(self.x)
+        return self.derivatives[:n, :n]
 
 
 class GuardsAt(NamedTuple):

@@ -7,12 +7,13 @@ References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical 
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from filippov.cycles.itinerary import Leg
-from filippov.cycles.motions import Array, Guard, Mode, Motions
+from filippov.cycles.motions import Array, Guard, GuardsAt, Mode, Motions
 from filippov.cycles.shooting import Passage, Shooting, Shot
 from filippov.cycles.zero import zero_between
 
@@ -123,17 +124,19 @@ def _minimum(
 ) -> tuple[float, Array, float]:
     """Return time, state and value of the minimum of a guard between two times: its rate is zero there."""
 
-    def point_at(t: float) -> Array:
-        return motions.leg(leg.mode, leg.discrete, t0, x, t - t0).x if t > t0 else x
+    @cache
+    def there(t: float) -> tuple[Array, GuardsAt]:
+        point = motions.leg(leg.mode, leg.discrete, t0, x, t - t0).x if t > t0 else x
+        return point, motions.at(leg.mode, leg.discrete, t, point)
 
     def rate_at(t: float) -> float:
-        return float(motions.at(leg.mode, leg.discrete, t, point_at(t)).rates()[g])
+        return float(there(t)[1].rates()[g])
 
     low, high = ((t, rate_at(t)) for t in bracket)
     if low[1] * high[1] < 0:
-        t = zero_between(rate_at, low, high, 1e-14 * max(1.0, abs(t)))
-    point = point_at(t)
-    return t, point, float(motions.at(leg.mode, leg.discrete, t, point).values[g])
+        t = zero_between(rate_at, low, high, 1e-10 * max(1.0, abs(t)))
+    point, guards = there(t)
+    return t, point, float(guards.values[g])
 
 
 def _code_inside(motions: Motions, guard: Guard) -> str:

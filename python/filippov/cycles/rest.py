@@ -172,7 +172,7 @@ class EquilibriumCurve:
             h += found[n:][list(self.sliding)] / len(self._corners)
         return np.concatenate([total, h])
 
-    def equations(self, w: Array) -> tuple[Array, Array]:
+    def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
         """Return the equations and their derivatives."""
         return self.residual(w), differences(self.residual, w, self.scales(w))
 

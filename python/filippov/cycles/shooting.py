@@ -63,20 +63,25 @@ class Passage(NamedTuple):
     map: Array | None
     discrete: tuple[float, ...]
 
-    def derivatives(self) -> tuple[Array, Array | None]:
-        """Return the derivatives of the state behind the end, and those of the equation there.
+    def derivatives(self) -> Array:
+        """Return the derivatives of the state behind the end, and in a last row those of the equation there.
 
         Their columns are by the state at the start, the time there, the duration, and the parameters.
         """
-        behind = self.leg.derivatives if self.map is None else self._along(self.map)
-        return behind, None if self.row is None else self._along(self.row)
+        n, known = len(self.after), self.leg.derivatives
+        if self.map is None and (self.row is None or len(known) > n):
+            return known
+        found = [known[:n] if self.map is None else self._along(self.map)]
+        if self.row is not None:
+            found.append(known[n:] if len(known) > n else self._along(self.row[None]))
+        return np.concatenate(found)
 
     def _along(self, rows: Array) -> Array:
         """Return derivatives of what is a function of the end, by the columns of the leg."""
         n = len(self.after)
-        found = rows[..., 1 : 1 + n] @ self.leg.derivatives
-        found[..., n : n + 2] += rows[..., :1]
-        found[..., n + 2 :] += rows[..., 1 + n :]
+        found = rows[:, 1 : 1 + n] @ self.leg.derivatives[:n]
+        found[:, n : n + 2] += rows[:, :1]
+        found[:, n + 2 :] += rows[:, 1 + n :]
         return np.asarray(found)
 
     def across(self, states: Array, time: Array) -> Array:
@@ -252,17 +257,14 @@ class Shooting:
             following = (i + 1) % m
             residual[first:last] = passage.after - starts[following]
             residual[last] = passage.value
-            for rows, found in zip(
-                (slice(first, last), slice(last, last + 1)), passage.derivatives(), strict=True
-            ):
-                if found is not None:
-                    own = jacobian[rows]
-                    own[..., i * n : (i + 1) * n] = found[..., :n]
-                    own[..., m * n : duration] = found[..., n : n + 1]
-                    own[..., duration] = found[..., n + 1]
-                    own[..., m * (n + 1) : size] = found[..., n : n + 1]
-                    own[..., size:] = found[..., n + 2 :]
-            jacobian[first:last, following * n : (following + 1) * n] -= self._unit
+            found = passage.derivatives()
+            own = jacobian[first : first + len(found)]
+            own[:, i * n : (i + 1) * n] = found[:, :n]
+            own[:, m * n : duration] = found[:, n : n + 1]
+            own[:, duration] = found[:, n + 1]
+            own[:, m * (n + 1) : size] = found[:, n : n + 1]
+            own[:, size:] = found[:, n + 2 :]
+            own[:n, following * n : (following + 1) * n] -= self._unit
             if leg.is_cut:
                 jacobian[last] = 0.0
                 residual[last] = durations[i] - self._shares[i] * durations[i + 1]
