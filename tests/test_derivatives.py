@@ -400,12 +400,18 @@ def test_a_run_that_begins_or_ends_at_an_instant_is_named() -> None:
         (lambda t, x: [-0.5 * x[0] - 2 * np.heaviside(x[0], 0.5)], [0.0], "x[0]", None),
         # The surface has a kink there: no change of x1 leads to the side whose derivative it is.
         (lambda t, x: [np.where(x[0] + abs(x[1]) > 0, -2.0, -1.0), 0.1], [0.0, 0.0], "x[1]", None),
+        # The motion rests on a kink that only a surface passed later has, or the field at later times.
+        (lambda t, x: [np.where(x[0] > abs(x[1]), -2.0, -1.0), -x[1]], [1.0, 0.0], "x[1]", None),
+        (lambda t, x: [abs(x[1]) * np.where(t > 0.5, 1.0, 0.0), -x[1]], [1.0, 0.0], "x[1]", None),
     ],
 )
 def test_a_start_whose_sides_differ_is_named(fun: Any, y0: Any, surface: str, slope: float | None) -> None:
+    system = fl.System(fun, n=len(y0))
     with pytest.warns(fl.FilippovWarning, match="one_sided: the run starts on"):
-        sol = fl.System(fun, n=len(y0)).solve((0, 1), y0, wrt="y0", **TIGHT)
+        sol = system.solve((0, 1), y0, wrt="y0", **TIGHT)
     assert surface in sol.warnings[-1].surfaces
+    with pytest.warns(fl.FilippovWarning, match="the run starts on .*: the gradient by the start"):
+        fl.gradient(system, (0, 1), y0, terminal=lambda t, y: y[0], wrt="y0", **TIGHT)
     if slope is not None:
         assert sol.derivative()[-1, 0] == pytest.approx(slope)
 

@@ -35,6 +35,7 @@ OPTIONS: dict[str, Any] = {**LIMITS, "rtol": 1e-12, "atol": 1e-12, "max_wall_tim
 N_PARAMETERS = 2
 # Lengths of differences. A run that passes a tangency at a smaller distance has another itinerary.
 LENGTHS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+LONGER = 1e-3
 # What a run at these tolerances is wrong by, over the size of its state and of its derivative. Where a column
 # disagrees, the errors of its runs are measured too, as their distances from runs at a smaller tolerance.
 NOISE = 3e-12
@@ -200,7 +201,8 @@ def _quotients(
     """Return the quotients to the right and to the left, for all lengths."""
     found = []
     of_middle = np.abs(end(0.0, **SMALLER) - middle).max() if is_measured else 0.0
-    for d in LENGTHS:
+    # Where the shorter ones are noise, a longer one tells a bent function from one with a kink.
+    for d in ((LONGER, *LENGTHS) if is_measured else LENGTHS):
         ends = [end(d), end(-d)]
         sides = [(ends[0] - middle) / d, (middle - ends[1]) / d]
         size = 1 + np.abs(middle).max()

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{Discrete, Edge, Kind, Names, NodeId, PartSign, Pieces, Switching};
+use filippov_expr::{Discrete, Edge, Names, NodeId, PartSign, Pieces, Switching};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -10,9 +10,6 @@ use crate::builder::Builder;
 
 /// Signs that are fixed, by surface.
 type Signs = Vec<(u32, f64)>;
-
-/// A region: signs, kind, value, step.
-type Row = (Signs, &'static str, Option<f64>, Option<f64>);
 
 /// The regions of the expressions of a builder, in a copy of its graph.
 #[pyclass(frozen, module = "filippov._core")]
@@ -98,24 +95,6 @@ impl Regions {
                 (rest.0, i64::from(index), orientation, has_signs)
             }
         })
-    }
-
-    fn split(&self, node: u32, most: usize, in_full: bool) -> PyResult<(Vec<Row>, bool)> {
-        let mut regions = self.lock();
-        let node = Builder::node(regions.graph(), node)?;
-        let split = regions.split(node, most, in_full);
-        let rows = split.regions.into_iter().map(|region| {
-            let kind = match region.kind {
-                Kind::Zero => "zero",
-                Kind::Positive => "positive",
-                Kind::Negative => "negative",
-                Kind::Varies => "varies",
-            };
-            let signs = (0..).zip(region.signs);
-            let signs = signs.filter_map(|(k, sign)| Some((k, sign?))).collect();
-            (signs, kind, region.value, region.step)
-        });
-        Ok((rows.collect(), split.is_complete))
     }
 
     fn matters(&self, roots: Vec<u32>, signs: Signs, surface: u32) -> PyResult<bool> {

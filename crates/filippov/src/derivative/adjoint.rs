@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use super::between::{state_at, EventGradient};
 use super::borders::{
     differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
-    surfaces_landed_on, ticks_at_start, Borders,
+    surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -265,8 +265,9 @@ pub struct Walk<'w> {
     timed: Vec<(f64, usize)>,
     /// The motion that has been reached.
     piece: Option<Piece<'w>>,
-    /// The last time of the run.
+    /// The last time of the run, and the state then.
     t_last: f64,
+    x_last: Vec<f64>,
     /// What the limits of infinitely many switches owe to earlier instants.
     owed: Vec<Shares>,
     borders: Borders,
@@ -294,6 +295,53 @@ impl WayBack<'_> {
         walk.back(&whole)?;
         walk.finish(trail)
     }
+
+    /// The surfaces, among those that the run stays on from its start, whose sides begin to differ where they are not yet left.
+    fn begin_to_differ(
+        &self,
+        stays_on: &[usize],
+        trail: &Trail,
+        mut around: Surroundings,
+        (t_last, x_last): (f64, &[f64]),
+    ) -> Result<Vec<usize>, FieldError> {
+        let (mut kept, mut found) = (Kept::moved_off(stays_on), Vec::new());
+        let first = trail.start.as_ref();
+        let mut last = first.map(|start| (&start.mode, &start.q[..]));
+        for instant in &trail.instants {
+            let record = instant.record();
+            let mut piece = Piece::new(&around, record.mode[0], record.discrete[0]);
+            let z = piece.extended.state(record.x[0]);
+            kept = still_kept(kept, &piece, (record.t[0], &z), &mut found)?;
+            for one in &mut kept {
+                found.extend(one.bends_what_vanishes(&mut piece, &record)?);
+            }
+            around.take_sides(record.mode[0]);
+            last = Some((record.mode[1], record.discrete[1]));
+        }
+        if let Some((mode, q)) = last.filter(|_| !kept.is_empty()) {
+            let piece = Piece::new(&around, mode, q);
+            let z = piece.extended.state(x_last);
+            still_kept(kept, &piece, (t_last, &z), &mut found)?;
+        }
+        Ok(found)
+    }
+}
+
+/// Those that a run still stays on; the surfaces of those whose sides begin to differ are put to `found`.
+fn still_kept(
+    kept: Vec<Kept>,
+    piece: &Piece,
+    (t, z): (f64, &[f64]),
+    found: &mut Vec<usize>,
+) -> Result<Vec<Kept>, FieldError> {
+    let mut still = Vec::new();
+    for mut one in kept {
+        if one.holds(piece, t, z)? {
+            found.extend(one.begins_to_differ(piece, (t, z))?);
+            still.push(one);
+        }
+    }
+    Ok(still)
 }
 
 impl<'w> Walk<'w> {
@@ -314,6 +362,7 @@ impl<'w> Walk<'w> {
             timed,
             piece: None,
             t_last: f64::NAN,
+            x_last: Vec::new(),
             owed: Vec::new(),
             borders: Borders::default(),
             points: Vec::new(),
@@ -357,10 +406,14 @@ impl<'w> Walk<'w> {
             }
             let borders = &mut found.borders;
             let at = (start.t, &z[..]);
-            borders.starts_on = surfaces_at_start(&mut piece, at, kinds, &columns)?.0;
+            let stays_on;
+            (borders.starts_on, stays_on) = surfaces_at_start(&mut piece, at, kinds, &columns)?;
             borders.starts_at_end = starts_at_end(&mut piece, at, &borders.starts_on, &arrived)?;
             borders.starts_at_threshold = starts_at_threshold(&piece, at, kinds)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
+            let end = (self.t_last, &self.x_last[..]);
+            let later = self.run.begin_to_differ(&stays_on, trail, around, end)?;
+            borders.starts_on.extend(later);
             found.by_start = -dot(&found.by_state, &field);
         }
         Ok(found)
@@ -425,6 +478,7 @@ impl<'w> Walk<'w> {
         let extended = self.run.systems.1;
         let x = extended.with_named(stretch.solution.last_state(), q);
         self.t_last = stretch.solution.t_last;
+        self.x_last = x.to_vec();
         let end = (self.t_last, &x[..]);
         for term in self.terms {
             if let When::End(zero) = term.at {

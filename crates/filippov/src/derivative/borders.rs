@@ -144,6 +144,13 @@ impl Kept {
         own.collect()
     }
 
+    /// Quiet surfaces on which a run is, with one column that came to each of them.
+    pub fn moved_off(surfaces: &[usize]) -> Vec<Kept> {
+        let mut all = Kept::all(surfaces, 1, false);
+        all.iter_mut().for_each(|one| one.sides.fill(1.0));
+        all
+    }
+
     /// The surface, if its sides differ from here on for one of the columns.
     pub fn begins_to_differ(
         &mut self,
@@ -156,6 +163,32 @@ impl Kept {
         let mut normal = vec![0.0; z.len()];
         piece.gradient(self.surface, t, z, &mut normal)?;
         self.has_sides = bends_across(piece, self.surface, (t, z), &normal)?;
+        Ok(self.has_sides.then_some(self.surface))
+    }
+
+    /// The surface, if what vanishes at an instant has a kink there: from then on its sides differ for the columns that came to them.
+    pub fn bends_what_vanishes(
+        &mut self,
+        piece: &mut Piece,
+        record: &InstantRecord,
+    ) -> Result<Option<usize>, FieldError> {
+        if self.has_sides || self.sides.iter().all(|side| *side == 0.0) {
+            return Ok(None);
+        }
+        let z = piece.extended.state(record.x[0]);
+        for guard in record.guards {
+            let Guard::Surface(j) = *guard else {
+                continue;
+            };
+            let mut normals = [vec![0.0; z.len()], vec![0.0; z.len()]];
+            let own = piece.signs[self.surface];
+            for (sign, normal) in [1.0, -1.0].into_iter().zip(&mut normals) {
+                piece.signs[self.surface] = sign;
+                piece.gradient(j, record.t[0], &z, normal)?;
+            }
+            piece.signs[self.surface] = own;
+            self.has_sides |= differ(&normals[0], &normals[1]);
+        }
         Ok(self.has_sides.then_some(self.surface))
     }
 

@@ -386,6 +386,10 @@ impl<'a> Tangents<'a> {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
+        for kept in &mut self.kept_on {
+            let differs = kept.bends_what_vanishes(&mut before, record)?;
+            self.found.borders.starts_on.extend(differs);
+        }
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
         let is_accumulation = record.t[0] != record.t[1];
