@@ -326,8 +326,22 @@ def memory() -> list[Line]:
     return lines
 
 
+def gain_of_two_processes() -> float:
+    """Return how many times the work of one process this machine does in two that share nothing."""
+    command = [sys.executable, "-c", "sum(i * i for i in range(5 * 10**6))"]
+
+    def seconds(count: int) -> float:
+        start = perf_counter()
+        running = [subprocess.Popen(command) for _ in range(count)]
+        for process in running:
+            process.wait()
+        return perf_counter() - start
+
+    return 2.0 * seconds(1) / seconds(2)
+
+
 def threads() -> list[Line]:
-    """One thread and two, by the clock, for an ensemble and for a diagram."""
+    """One thread and two, by the clock, for an ensemble and for a diagram; beside them two processes."""
     from diagram import frequencies, ours
 
     system = fl.System(oscillator(0, False), n=2)
@@ -341,13 +355,15 @@ def threads() -> list[Line]:
     for name, way in ways.items():
         way(2)
         samples: dict[int, list[float]] = {1: [], 2: []}
+        gains = []
         for _ in range(N_ROUNDS + 2):
+            gains.append(gain_of_two_processes())
             for n, times in samples.items():
                 start = perf_counter()
                 way(n)
                 times.append(perf_counter() - start)
         one, two = (np.array(times) for times in samples.values())
-        detail = f"{np.median(one):.2f} s / {np.median(two):.2f} s"
+        detail = f"{np.median(one):.2f} s / {np.median(two):.2f} s; two processes: {np.median(gains):.2f}x"
         ratio = float(np.median(one / two))
         lines.append(
             Line(f"{name}: one thread / two, by the clock", ratio, 1.9, at_least=True, detail=detail)
