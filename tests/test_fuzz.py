@@ -30,6 +30,16 @@ def test_random_systems_keep_all_properties(first: int) -> None:
         assert not found, f"seed {seed}: {found[:3]}\n{case.source}"
 
 
+def test_sliding_on_two_surfaces_ends_on_a_kink_of_one() -> None:
+    """Three surfaces meet there, and the motion was on two of them."""
+    case = random_case(441190)
+    _, found = check(case)
+    assert not found
+    last = build(case.source).solve().switches[-1]
+    assert last.kind == "exit_sliding"
+    assert last.t == pytest.approx(2.00453167, abs=1e-7)
+
+
 def test_random_systems_have_all_features() -> None:
     features: Counter[str] = Counter()
     for seed in range(N):

@@ -69,8 +69,9 @@ fn incoming(
         .functions()
         .iter()
         .find(|guard| !guard.is_surface());
-    let (Some(exit), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
-    else {
+    // A meeting with further surfaces, that the motion only passes, begins on a face.
+    let ends = meeting.is_exit() && at.arrival.sliding == meeting.surfaces;
+    let (Some(exit), ModeField::Intersection(field), true) = (exit, &**field, ends) else {
         return Ok(Incoming::Face {
             mode: entries,
             multipliers,
