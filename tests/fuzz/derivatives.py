@@ -201,7 +201,7 @@ def _quotients(
     """Return the quotients to the right and to the left, for all lengths."""
     found = []
     of_middle = np.abs(end(0.0, **SMALLER) - middle).max() if is_measured else 0.0
-    # Where the shorter ones are noise, a longer one tells a bent function from one with a kink.
+    # The short quotients may all be noise. Then a longer one shows whether the function has a kink.
     for d in (LONGER, *LENGTHS) if is_measured else LENGTHS:
         ends = [end(d), end(-d)]
         sides = [(ends[0] - middle) / d, (middle - ends[1]) / d]

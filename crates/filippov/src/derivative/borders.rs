@@ -180,14 +180,7 @@ impl Kept {
             let Guard::Surface(j) = *guard else {
                 continue;
             };
-            let mut normals = [vec![0.0; z.len()], vec![0.0; z.len()]];
-            let own = piece.signs[self.surface];
-            for (sign, normal) in [1.0, -1.0].into_iter().zip(&mut normals) {
-                piece.signs[self.surface] = sign;
-                piece.gradient(j, record.t[0], &z, normal)?;
-            }
-            piece.signs[self.surface] = own;
-            self.has_sides |= differ(&normals[0], &normals[1]);
+            self.has_sides |= has_kink_on(piece, j, self.surface, (record.t[0], &z))?;
         }
         Ok(self.has_sides.then_some(self.surface))
     }
@@ -270,32 +263,41 @@ fn surfaces_with_sides(
             }
         };
         match has_sides {
-            true => found.push((j, normal)),
+            true => found.push(j),
             false => others.push(j),
         }
     }
-    let mut all: Vec<usize> = found.iter().map(|(j, _)| *j).collect();
+    let mut all = found.clone();
     for k in others {
         // A place beside all of them comes to a surface slid on across the others, or not.
         if !found.is_empty() && piece.sliding.contains(&k) {
             all.push(k);
             continue;
         }
-        let side = piece.signs[k];
-        piece.signs[k] = -side;
-        let mut has_kink = false;
-        for (j, normal) in &found {
-            let mut beyond = vec![0.0; z.len()];
-            piece.gradient(*j, t, z, &mut beyond)?;
-            has_kink |= differ(normal, &beyond);
-        }
-        piece.signs[k] = side;
-        if has_kink {
-            all.push(k);
+        for &j in &found {
+            if has_kink_on(piece, j, k, (t, z))? {
+                all.push(k);
+                break;
+            }
         }
     }
     all.sort_unstable();
     Ok((all, kept))
+}
+
+/// Does the function of surface `j` have a kink on surface `k` at a place?
+fn has_kink_on(
+    piece: &mut Piece,
+    j: usize,
+    k: usize,
+    (t, z): (f64, &[f64]),
+) -> Result<bool, FieldError> {
+    let mut normals = [vec![0.0; z.len()], vec![0.0; z.len()]];
+    for normal in &mut normals {
+        piece.gradient(j, t, z, normal)?;
+        piece.signs[k] = -piece.signs[k];
+    }
+    Ok(differ(&normals[0], &normals[1]))
 }
 
 /// Does a motion with this velocity stay on a surface, as far as the first two derivatives say?
