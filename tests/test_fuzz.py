@@ -6,6 +6,7 @@ from collections import Counter
 from types import SimpleNamespace
 from typing import Any
 
+import filippov as fl
 import numpy as np
 import pytest
 from fuzz.__main__ import check
@@ -39,6 +40,45 @@ def test_sliding_on_two_surfaces_ends_on_a_kink_of_one() -> None:
     sol = build(case.source).solve()
     assert sol.success
     np.testing.assert_allclose(sol.y[:, -1], [-0.0068847, -0.0056433], atol=2e-7)
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "Taylor", "Rodas5P"])
+@pytest.mark.parametrize("power", [3, 5])
+def test_sliding_where_all_derivatives_vanish_is_right_or_refused(method: str, power: int) -> None:
+    """Both sides press the motion to x0 = 0, where h vanishes to third order or higher along all motions.
+
+    It slides there from 1.394233 until cos(1.95 t) is zero again.
+    """
+    end_of_sliding = 1.5 * np.pi / 1.95
+
+    def field(t: float, x: Any) -> Any:
+        h = x[1] - 0.2 * x[0] ** power
+        return [-0.593 * x[0] - 0.98 * np.where(h >= 0, 0.302 * np.cos(1.95 * t), 0.5), -x[1]]
+
+    for tolerance in 10.0 ** -np.arange(4.0, 13.0):
+        sol = fl.solve_ivp(field, (0.0, 3.0), [0.0, 0.0], method=method, rtol=tolerance, atol=tolerance)
+        assert sol.success or "neither side can be followed" in sol.message
+        close = 20 * tolerance + 1e-6
+        if sol.success:
+            np.testing.assert_allclose(sol.switches.t, [1.394233, end_of_sliding], atol=close)
+            np.testing.assert_allclose(sol.y[0, -1], -0.0783264, atol=close)
+        else:
+            np.testing.assert_allclose(sol.t[-1], 1.394233, atol=close)
+
+
+def test_a_motion_that_rests_near_a_two_fold_does_not_jump_to_it() -> None:
+    """Sliding ends at cos(2.166 t) = 0, where x1 = -9e-6 is nine tolerances from the two-folds x1 = 0."""
+
+    def field(t: float, x: Any) -> Any:
+        h = x[1] * x[0] + 0.281 * x[0] ** 4
+        pushed = 0.534 * np.where(h >= 0, 0.9 * np.cos(2.166 * t), 0.744)
+        return [-0.608 * x[0] - pushed, -x[1] - 0.336 * h]
+
+    for method in ("Rodas5P", "DOPRI5", "DOP853", "Taylor"):
+        sol = fl.solve_ivp(field, (0.0, 4.0), [0.0, 0.0], method=method, rtol=1e-6, atol=1e-6)
+        assert list(sol.switches.kind) == ["enter_sliding", "exit_sliding"]
+        np.testing.assert_allclose(sol.switches.t, [1.266132, 1.5 * np.pi / 2.166], atol=1e-5)
+        np.testing.assert_allclose(sol.y[0, -1], -0.167830, atol=1e-5)
 
 
 def test_random_systems_have_all_features() -> None:

@@ -159,7 +159,27 @@ pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldErr
     if !end.iter().zip(at.x).enumerate().all(is_near) {
         return Ok(None);
     }
-    Ok(if t > at.t { Some((t, end)) } else { here })
+    if t <= at.t {
+        return Ok(here);
+    }
+    Ok(is_straight(at, j, (t, &end))?.then_some((t, end)))
+}
+
+/// Is the straight way to this place accurate to errors of steps? A motion that rests near a two-fold for long does not come to
+/// it: until then the fields change.
+fn is_straight(at: &Point, j: usize, (t, end): (f64, &[f64])) -> Result<bool, FieldError> {
+    let n = end.len();
+    let (mut here, mut there) = (vec![0.0; n], vec![0.0; n]);
+    for side in [-1, 1] {
+        let signs = at.arrival.mode.with(j, side).signs();
+        at.system.field(&at.place(&signs), &mut here)?;
+        at.system.field(&at.place_at(t, end, &signs), &mut there)?;
+        there.iter_mut().zip(&here).for_each(|(v, w)| *v -= w);
+        if at.scale.largest(&there, end) * (t - at.t) > 10.0 * ERRORS_OF_STEPS {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// The point where the motion on surface `j` goes on beyond a double zero of the difference of the normal components, if

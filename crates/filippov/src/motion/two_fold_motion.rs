@@ -370,39 +370,108 @@ fn roots(b: &[f64]) -> SmallVec<[f64; 4]> {
 
 /// Those in (0, 1) at which the sum changes its sign, if b does not end with zeros.
 fn roots_inside(b: &[f64]) -> SmallVec<[f64; 4]> {
-    let changes = b.iter().any(|b| *b > 0.0) && b.iter().any(|b| *b < 0.0);
-    if !changes {
+    let zeros = zeros_inside(b);
+    let is_positive_beside = |k: usize| {
+        let left = if k == 0 { 0.0 } else { zeros[k - 1] };
+        let right = zeros.get(k).copied().unwrap_or(1.0);
+        sum_at(b, 0.5 * (left + right)).value > 0.0
+    };
+    let changes = |k: &usize| is_positive_beside(*k) != is_positive_beside(k + 1);
+    (0..zeros.len()).filter(changes).map(|k| zeros[k]).collect()
+}
+
+/// All zeros in (0, 1), in increasing order. A multiple one is where the derivative vanishes too: halvings would find it
+/// to a few digits only.
+fn zeros_inside(b: &[f64]) -> SmallVec<[f64; 4]> {
+    let has_both_signs = b.iter().any(|b| *b > 0.0) && b.iter().any(|b| *b < 0.0);
+    if !has_both_signs {
         return SmallVec::new();
     }
     let n = b.len() - 1;
-    let value = |w: f64| -> f64 {
-        let terms = b.iter().enumerate();
-        terms
-            .map(|(m, b)| b * w.powi(m as i32) * (1.0 - w).powi((n - m) as i32))
-            .sum()
-    };
     let slopes: SmallVec<[f64; 8]> = (0..n)
         .map(|m| (m + 1) as f64 * b[m + 1] - (n - m) as f64 * b[m])
         .collect();
-    let mut ends = roots_inside(&slopes);
-    ends.push(1.0);
-    let (mut low, mut found) = (0.0, SmallVec::new());
-    for end in ends {
-        if value(low) * value(end) < 0.0 {
+    let sign = |w: f64| {
+        let LieValue { value, magnitude } = sum_at(b, w);
+        match value.abs() > TANGENT * magnitude {
+            true => value.signum(),
+            false => 0.0,
+        }
+    };
+    let mut found = SmallVec::new();
+    let mut low = 0.0;
+    for end in zeros_inside(&slopes).into_iter().chain([1.0]) {
+        if sign(low) * sign(end) < 0.0 {
             let (mut left, mut right) = (low, end);
             for _ in 0..MOST_HALVINGS {
                 let middle = 0.5 * (left + right);
                 if middle <= left || middle >= right {
                     break;
                 }
-                match value(left) * value(middle) > 0.0 {
+                match sum_at(b, left).value * sum_at(b, middle).value > 0.0 {
                     true => left = middle,
                     false => right = middle,
                 }
             }
             found.push(0.5 * (left + right));
+        } else if sign(end) == 0.0 && end < 1.0 {
+            found.push(end);
         }
         low = end;
     }
     found
+}
+
+/// The sum of b_m w^m (1 - w)^(n - m), and that of the magnitudes of its terms.
+fn sum_at(b: &[f64], w: f64) -> LieValue {
+    let n = b.len() - 1;
+    let terms = b.iter().enumerate();
+    let terms = terms.map(|(m, b)| b * w.powi(m as i32) * (1.0 - w).powi((n - m) as i32));
+    terms.fold(
+        LieValue {
+            value: 0.0,
+            magnitude: 0.0,
+        },
+        |sum, term| LieValue {
+            value: sum.value + term,
+            magnitude: sum.magnitude + term.abs(),
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::roots;
+
+    /// The Bernstein form of a product of factors a w + b (1 - w), without the binomial coefficients.
+    fn product(factors: &[(f64, f64)]) -> Vec<f64> {
+        factors.iter().fold(vec![1.0], |b, (a, c)| {
+            let mut product = vec![0.0; b.len() + 1];
+            for (m, b) in b.iter().enumerate() {
+                product[m] += c * b;
+                product[m + 1] += a * b;
+            }
+            product
+        })
+    }
+
+    fn assert_roots(factors: &[(f64, f64)], expected: &[f64]) {
+        let found = roots(&product(factors));
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn roots_are_where_the_sum_changes_its_sign() {
+        let (a, b) = ((3.0, -1.0), (0.3, -0.4));
+        assert_roots(&[a, b], &[0.25, 4.0 / 7.0]);
+        assert_roots(&[a, a, b], &[4.0 / 7.0]);
+        assert_roots(&[a, a, a], &[0.25]);
+        assert_roots(&[a, b, a, a], &[0.25, 4.0 / 7.0]);
+        assert_roots(&[(0.14, -0.49); 3], &[7.0 / 9.0]);
+        assert_roots(&[(0.14, -0.49); 5], &[7.0 / 9.0]);
+        assert_roots(&[(1.0, 0.0), a], &[0.0, 0.25]);
+    }
 }
