@@ -43,6 +43,13 @@ def test_a_function_that_rests_at_an_equilibrium_with_another_value_is_refused()
         fl.solve_ivp(lambda t, x: [x[0] - 1, np.sign((x[0] - 1) ** 2)], (0.0, 1.0), [1.0, 0.0])
 
 
+def test_a_function_is_compared_behind_a_point_that_its_motion_leaves_with_its_second_derivative() -> None:
+    """By NumPy the sign of x0^2 is 0 at the start only, and x0 = t^2 / 2 + ..."""
+    sol = fl.solve_ivp(lambda t, x: [np.sin(t), 2.0 - np.sign(x[0] * x[0])], (0.0, 3.0), [0.0, 0.0])
+    assert sol.success
+    np.testing.assert_allclose(sol.y[:, -1], [1.0 - np.cos(3.0), 3.0], atol=1e-5)
+
+
 def test_a_value_that_changes_between_calls_is_still_refused() -> None:
     calls = [0.0]
 

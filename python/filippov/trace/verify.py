@@ -30,8 +30,9 @@ N_POINTS = 5
 # Rewriting the expression changes its rounding errors only; a baked value differs by far more.
 _TOLERANCE = 1e-9
 
-# How long after a point that has a value of its own they are compared once more, relative to the time.
-_BEHIND = 1e-6
+# How long after a point with a value of its own they are compared once more, relative to the time; and how
+# many times, for a motion that leaves it with its second or a later derivative.
+_BEHIND, _TIMES_BEHIND = 1e-6, 4
 
 Vector = NDArray[np.float64]
 _Point = tuple[float, Vector]
@@ -79,8 +80,7 @@ def verify(
             # Off the ticks, where rounding decides.
             points = [(t + 1e-3 * (1 + abs(t)) * math.sqrt(0.1 + k), x) for k, (t, x) in enumerate(points)]
         for t, x, own, traced in _differing(system, fun, points, values):
-            dt = _BEHIND * (1.0 + abs(t))
-            if role != "fun" or _differing(system, fun, [(t + dt, x + dt * traced)], values):
+            if role != "fun" or not _agrees_behind(system, fun, (t, x), traced, values):
                 raise _disagreement(fun, role, t, x, int(np.abs(own - traced).argmax()), own, traced)
 
 
@@ -123,6 +123,20 @@ def _differing(
     differs = np.abs(own - traced).max(axis=1) > _TOLERANCE * (1.0 + size)
     differs &= np.isfinite(own + traced).all(axis=1)
     return [row for row, is_different in zip(compared, differs.tolist(), strict=True) if is_different]
+
+
+def _agrees_behind(
+    system: TracedSystem, fun: Callable[[float, Vector], Any], at: _Point, velocity: Vector, values: Vector
+) -> bool:
+    """Return whether they agree on the way from a point at which they do not."""
+    t, x = at
+    for _ in range(_TIMES_BEHIND):
+        dt = _BEHIND * (1.0 + abs(t))
+        differing = _differing(system, fun, [(t + dt, x + dt * velocity)], values)
+        if not differing:
+            return True
+        t, x, _, velocity = differing[0]
+    return False
 
 
 def _points(t0: float, y0: Vector) -> list[_Point]:
@@ -171,6 +185,6 @@ def _disagreement(
         f"{role} differs from its traced expression: {own[component]:.16g} by the function, "
         f"{traced[component]:.16g} by the expression, {where}. It uses something that tracing cannot see: a "
         "random number, a global or a stored value that changed between the calls, or a test of the type of "
-        "its arguments.\n"
+        "its arguments; or the motion stays where it has a value of its own, as sign(x**2) has at x = 0.\n"
         f"What to do:\n  - compute the result from t, x and the arguments alone\n  - {BLACK_BOX}"
     )
