@@ -225,3 +225,67 @@ def test_a_start_at_rest_on_a_surface_where_the_field_of_one_side_vanishes() -> 
     with pytest.warns(fl.FilippovWarning, match="starts") as shown:
         fl.gradient(system, (0, 1), [0.0, 0.0], terminal=lambda t, y: y[0], wrt="y0")
     assert len(shown) == 2
+
+
+def test_sliding_on_two_surfaces_that_ends_where_a_jump_vanishes() -> None:
+    """The jump across the second vanishes with cos(p t + x2), where its multiplier is 0.988."""
+
+    def fun(t: float, x: Any, p: float) -> Any:
+        first, second = np.sign(0.862 * x[2] - 0.796 * x[1] + 0.965 * x[0] - 0.64), np.sign(x[1] + 0.503)
+        wave = 0.45 * np.cos(0.474 * t + x[1]) - 0.83 * second * np.cos(p * t + x[2])
+        return [
+            -0.8 * x[0] + 0.59 * x[2] - x[1] / (1 + x[0] ** 2) - 1.1 * first + 0.28,
+            -0.5 * x[1] + 1.261 * x[2] - 0.3 * x[0] / (1 + x[2] ** 2) + wave,
+            -x[2] - 0.643 * x[0] - 0.2 * x[2] ** 3 - 0.78 * (0.298 * x[2] - 0.16) - 0.85 * second,
+        ]
+
+    system = fl.System(fun, n=3, params={"p": 1.57})
+    with pytest.warns(fl.FilippovWarning, match="the fields of both sides are tangent"):
+        sol = system.solve((0, 1.35), [-0.286, -0.8, -0.214], wrt=["p"], **TIGHT)
+    assert [switch.kind for switch in sol.switches] == ["enter_sliding", "enter_sliding", "exit_sliding"]
+    assert sol.sol.multipliers(sol.switches.t[2] - 1e-6)[1] == pytest.approx(0.98815, abs=1e-5)
+    assert sol.switches[2].derivative.lost == "grazing"
+    assert np.isnan(sol.derivative()).all()
+
+
+def test_changes_that_decay_while_the_state_rests() -> None:
+    """x1 = 0.04 x0 decays as exp(-26 t) on the surface: a step of a state at rest is long for it."""
+
+    def fun(t: float, x: Any) -> Any:
+        return [
+            -0.5 * x[0] + 1.3 * x[1] + np.copysign(0.16, x[1] - 0.02 * np.sin(2 * x[0])),
+            -0.9 * x[1] - x[0],
+        ]
+
+    system = fl.System(fun, n=2)
+    for method in METHODS:
+        sol = system.solve((0, 0.3), [0.0, 0.0], method=method, wrt="y0", **TIGHT)
+        decayed = np.exp(-(1.0 + 0.9 * 0.04) / 0.04 * 0.3)
+        np.testing.assert_allclose(sol.derivative()[:, 1], [25 * decayed, decayed], rtol=1e-9)
+
+
+def test_a_reset_that_puts_changed_runs_back_behind_its_surface() -> None:
+    """The map halves x1 = 0: runs with x1 < 0 are reset once, runs with x1 > 0 again and again."""
+    reset = fl.Reset(lambda t, x: x[0] + x[1], map=lambda t, x: [x[0], -0.5 * x[1]], direction=1)
+    system = fl.System(lambda t, x: [1.0, 0.0], n=2, resets=[reset])
+    with pytest.warns(fl.FilippovWarning, match="is put on"):
+        sol = system.solve((0, 1), [-0.5, 0.0], wrt="y0")
+    assert [warning.code for warning in sol.warnings] == ["one_sided"]
+    ends = [system.solve((0, 1), [-0.5, d]).y[1, -1] / d for d in (1e-5, -1e-5)]
+    np.testing.assert_allclose(ends, [0.25, -0.5])
+    assert sol.derivative()[1, 1] in (pytest.approx(-0.5), pytest.approx(0.25))
+
+
+def test_a_start_of_sliding_of_higher_order() -> None:
+    """x1 = 0 is of relative degree 2, and the run rests at the origin. Runs beside it leave it."""
+
+    def fun(t: float, x: Any) -> Any:
+        return [-0.4 * x[0] + x[1] - (0.0 if x[1] > 0 else 0.77), -0.94 * x[1] - 1.33 * x[0]]
+
+    system = fl.System(fun, n=2)
+    with pytest.warns(fl.FilippovWarning, match="sliding of higher order"):
+        sol = system.solve((0, 1), [0.0, 0.0], wrt="y0")
+    assert np.isnan(sol.derivative()).all()
+    with pytest.warns(fl.FilippovWarning, match="the gradient is NaN"):
+        found = fl.gradient(system, (0, 1), [0.0, 0.0], terminal=lambda t, y: y[0], wrt="y0")[1]
+    assert np.isnan(list(found.values())).all()

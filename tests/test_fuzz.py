@@ -66,6 +66,7 @@ def test_sliding_where_all_derivatives_vanish_is_right_or_refused(method: str, p
             np.testing.assert_allclose(sol.t[-1], 1.394233, atol=close)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_motion_that_rests_near_a_two_fold_does_not_jump_to_it() -> None:
     """Sliding ends at cos(2.166 t) = 0, where x1 = -9e-6 is nine tolerances from the two-folds x1 = 0."""
 

@@ -9,6 +9,7 @@ use super::placement::place;
 use super::point::{Cause, Notes, Point};
 use super::rule::{Decision, How, Meeting, Rule};
 use super::settle::settle;
+use super::singular_points::doubt_at_singular_points;
 
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -29,7 +30,10 @@ pub(crate) fn decide(
         }
         Cause::Event { .. } => {
             reached.find(at, notes)?;
-            after_event(at, notes, &reached.surfaces, &reached.before)
+            let surfaces = &reached.surfaces;
+            let Decision { decided, rule } = after_event(at, notes, surfaces, &reached.before)?;
+            doubt_at_singular_points(at, notes, surfaces, decided)
+                .map(|decided| Decision { decided, rule })
         }
     };
     if let (Ok(decision), false) = (&decision, notes.warnings.is_empty()) {

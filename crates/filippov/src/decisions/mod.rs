@@ -31,6 +31,7 @@ mod rule;
 mod scene;
 mod settle;
 mod sides;
+mod singular_points;
 mod spiral;
 mod surroundings;
 mod touching;

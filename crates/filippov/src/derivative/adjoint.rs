@@ -15,7 +15,7 @@ use super::borders::{
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
-use super::instant::{arrival, brought_by, Instant, Passage, Weights};
+use super::instant::{arrival, brought_by, Instant, Lost, Passage, Weights};
 use super::limit::{is_like, Shares, MOST_REMEMBERED};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
@@ -386,13 +386,13 @@ impl<'w> Walk<'w> {
             borders: self.borders,
             points: self.points,
         };
-        if found.lost.is_some() {
-            found.by_state.fill(f64::NAN);
-            found.by_parameters.fill(f64::NAN);
-        } else if let Some(start) = &trail.start {
+        if let (None, Some(start)) = (found.lost, &trail.start) {
             let mut around = Surroundings::at_start(extended, impacts, options);
             around.take_sides(&start.mode);
             let mut piece = Piece::new(&around, &start.mode, &start.q);
+            if piece.is_unsupported() {
+                found.lost = Some((start.t, Lost::Unsupported.name()));
+            }
             let z = extended.state(&start.x);
             let field = piece.rates(start.t, &z)?;
             let columns = extended.columns_at_start(kinds, &field);
@@ -415,6 +415,11 @@ impl<'w> Walk<'w> {
             let later = self.run.begin_to_differ(&stays_on, trail, around, end)?;
             borders.starts_on.extend(later);
             found.by_start = -dot(&found.by_state, &field);
+        }
+        if found.lost.is_some() {
+            found.by_state.fill(f64::NAN);
+            found.by_parameters.fill(f64::NAN);
+            found.by_start = f64::NAN;
         }
         Ok(found)
     }

@@ -62,25 +62,69 @@ pub(super) fn surfaces_landed_on(
     }
     let (t, field) = (record.t[1], record.field[1]);
     let z = piece.extended.state(record.x[1]);
-    let moved = |(&dt, column): (&f64, &Vec<f64>)| {
-        let mut place = column.clone();
-        let entries = place.iter_mut().zip(field);
-        entries.for_each(|(entry, rate)| *entry += rate * dt);
-        (dt, place)
-    };
-    let moved: Vec<_> = dt.iter().zip(columns).map(moved).collect();
+    let moved = |(&dt, column): (&f64, &Vec<f64>)| Beside::moved(dt, column, field);
+    let moved: Vec<Beside> = dt.iter().zip(columns).map(moved).collect();
     let mut found = surfaces_with_sides(piece, (t, &z), &moved)?.0;
     if arrives && slides_by_sides(piece, (t, &z))? {
         found.extend_from_slice(&piece.sliding);
         found.sort_unstable();
         found.dedup();
     }
-    // What an action happens on is met by a changed run too.
+    // What an action happens on is met by a changed run too; again, if the action puts it back behind its surface.
     let own = |act: &Act| piece.extended.surface_of(act.index);
     let own: Vec<usize> = record.acts.iter().filter_map(own).collect();
     let reached = |j: &usize| own.contains(j) || record.guards.contains(&Guard::Surface(*j));
     found.retain(|j| !reached(j));
+    let h = piece.surfaces(t, &z)?;
+    for j in own {
+        let normal = normal_if_on(piece, (j, h[j]), (t, &z))?;
+        if normal.is_some_and(|normal| moved.iter().any(|change| change.leads_off(&normal))) {
+            found.push(j);
+        }
+    }
     Ok(found)
+}
+
+/// The derivatives of h_j by time and state, if a place is on the surface.
+fn normal_if_on(
+    piece: &Piece,
+    (j, h): (usize, f64),
+    (t, z): (f64, &[f64]),
+) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
+    let size = piece.extended.system.surface_size(j, &piece.at(t, z))?;
+    if h.abs() > ROUNDING * size {
+        return Ok(None);
+    }
+    let mut normal = vec![0.0; z.len()];
+    let by_time = piece.gradient(j, t, z, &mut normal)?;
+    Ok(Some((by_time, normal)))
+}
+
+/// A change of time and state, with the sizes of what that of the state is the sum of.
+struct Beside {
+    time: f64,
+    state: Vec<f64>,
+    sizes: Vec<f64>,
+}
+
+impl Beside {
+    /// The change of a column, and of the motion with this velocity over the change of time.
+    fn moved(time: f64, column: &[f64], velocity: &[f64]) -> Self {
+        let (mut state, mut sizes) = (column.to_vec(), column.to_vec());
+        sizes.iter_mut().for_each(|size| *size = size.abs());
+        for (i, rate) in velocity.iter().enumerate() {
+            state[i] += rate * time;
+            sizes[i] += (rate * time).abs();
+        }
+        Beside { time, state, sizes }
+    }
+
+    /// Does it lead off a surface with these derivatives?
+    fn leads_off(&self, (by_time, normal): &(f64, Vec<f64>)) -> bool {
+        let terms = normal.iter().zip(&self.sizes).map(|(g, v)| (g * v).abs());
+        let size = (by_time * self.time).abs() + terms.sum::<f64>();
+        (by_time * self.time + dot(normal, &self.state)).abs() > ROUNDING * size
+    }
 }
 
 /// The surfaces through a start at which the sides differ for one of these columns, as they are before the motion acts on them, and
@@ -93,8 +137,8 @@ pub(super) fn surfaces_at_start(
 ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
     let later = |kind: &Column| f64::from(*kind == Column::Start);
     let moved = kinds.iter().zip(columns);
-    let moved: Vec<_> = moved
-        .map(|(kind, column)| (later(kind), column.clone()))
+    let moved: Vec<Beside> = moved
+        .map(|(kind, column)| Beside::moved(later(kind), column, &[]))
         .collect();
     surfaces_with_sides(piece, at, &moved)
 }
@@ -227,30 +271,20 @@ fn slides_by_sides(piece: &mut Piece, (t, z): (f64, &[f64])) -> Result<bool, Fie
 fn surfaces_with_sides(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
-    changes: &[(f64, Vec<f64>)],
+    changes: &[Beside],
 ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
     let h = piece.surfaces(t, z)?;
     let field = piece.rates(t, z)?;
     let slides_by_sides = slides_by_sides(piece, (t, z))?;
     let (mut found, mut others, mut kept) = (Vec::new(), Vec::new(), Vec::new());
     for (j, h) in h.iter().enumerate() {
-        let size = {
-            let place = piece.at(t, z);
-            ROUNDING * piece.extended.system.surface_size(j, &place)?
+        let Some(normal) = normal_if_on(piece, (j, *h), (t, z))? else {
+            continue;
         };
-        if h.abs() > size {
+        if !changes.iter().any(|change| change.leads_off(&normal)) {
             continue;
         }
-        let mut normal = vec![0.0; z.len()];
-        let by_time = piece.gradient(j, t, z, &mut normal)?;
-        let moves = |(time, state): &(f64, Vec<f64>)| {
-            let terms = normal.iter().zip(state).map(|(g, v)| (g * v).abs());
-            let size = (by_time * time).abs() + terms.sum::<f64>();
-            (by_time * time + dot(&normal, state)).abs() > ROUNDING * size
-        };
-        if !changes.iter().any(moves) {
-            continue;
-        }
+        let (by_time, normal) = normal;
         let has_sides = match piece.mode.entries()[j] {
             0 => piece.sliding.contains(&j) && slides_by_sides,
             _ => {

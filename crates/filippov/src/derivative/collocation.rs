@@ -16,6 +16,9 @@ const MOST_ITERATED: usize = 16;
 const MOST_ITERATIONS: usize = 40;
 const CONTRACTION: f64 = 0.5;
 
+/// The fastest rate of a sliding motion is seen in so many applications of its derivative.
+const FASTEST_POWER: u32 = 4;
+
 /// The equations Y_i = Y_0 + dt sum_j C_ij Df(t_j) Y_j for the change Y of the state at the nodes.
 ///
 /// For few states they are a full matrix. For many they are solved by iteration where the step is not stiff, and as a sparse matrix
@@ -55,6 +58,43 @@ pub(super) fn operations(n: usize, n_columns: usize) -> usize {
     // Large systems are sparse.
     let width = unknowns.min(STAGES * MOST_FULL);
     unknowns * width * (width + 6 * n_columns) / 3 + STAGES * 200
+}
+
+/// How fast changes are at a node: at least the fastest rate in a region, about that while the motion slides, where the multipliers
+/// change with the state.
+pub(super) fn fastest(rows: &SparseRows, (n, m): (usize, usize)) -> f64 {
+    if rows.n_rows() == n + m {
+        return fastest_in_region(rows, n);
+    }
+    let node = Node::of(rows, (n, m));
+    let no_shares = vec![0.0; node.rows.n_rows()];
+    let size = |change: &[f64]| change.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // Any change has a part in all directions.
+    let start: Vec<f64> = (0..n).map(|i| 1.0 + 0.3 * (1.0 + i as f64).sin()).collect();
+    let (mut change, mut rates) = (start.clone(), vec![0.0; n]);
+    let mut most = 0.0_f64;
+    for power in 1..=FASTEST_POWER {
+        node.rates(&change, &no_shares, &mut rates);
+        std::mem::swap(&mut change, &mut rates);
+        if power > 1 {
+            most = most.max((size(&change) / size(&start)).powf(1.0 / f64::from(power)));
+        }
+    }
+    most
+}
+
+/// The root of the largest sum of the absolute values of a row of F_x^2.
+fn fastest_in_region(rows: &SparseRows, n: usize) -> f64 {
+    let (mut product, mut most) = (vec![0.0; n], 0.0_f64);
+    for r in 0..n {
+        product.fill(0.0);
+        for (k, factor) in rows.row(r).filter(|(c, _)| *c < n) {
+            let entries = rows.row(k).filter(|(c, _)| *c < n);
+            entries.for_each(|(c, value)| product[c] += factor * value);
+        }
+        most = most.max(product.iter().map(|v| v.abs()).sum());
+    }
+    most.sqrt()
 }
 
 impl Collocation {

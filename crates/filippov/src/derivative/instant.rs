@@ -7,7 +7,7 @@ use super::change::{Change, Row, Rows};
 use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
-use crate::motion::{Guard, ModeField};
+use crate::motion::{Guard, ModeField, RootEnd};
 use crate::record::InstantRecord;
 use crate::system::{Act, PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
@@ -59,18 +59,24 @@ impl Weights {
         x.abs() + atol.unwrap_or(0.0) / self.rtol
     }
 
+    /// The length of a gradient: how much a function changes if time and states do so by their size.
+    fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64])) -> f64 {
+        let pairs = x.iter().zip(gradient).enumerate();
+        let by_state = pairs.map(|(i, (x, g))| (g * self.of(i, *x)).powi(2));
+        ((by_time * self.span).powi(2) + by_state.sum::<f64>()).sqrt()
+    }
+
     /// 1 / |cos| of the angle between a gradient and a motion.
-    fn condition(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), field: &[f64]) -> f64 {
-        let rate = by_time + dot(gradient, field);
-        let (mut normal, mut speed) = ((by_time * self.span).powi(2), self.span.powi(-2));
-        for (i, x) in x.iter().enumerate() {
-            let weight = self.of(i, *x);
-            normal += (gradient[i] * weight).powi(2);
-            if field[i] != 0.0 {
-                speed += (field[i] / weight).powi(2);
-            }
-        }
-        (normal * speed).sqrt() / rate.abs()
+    fn condition(&self, x: &[f64], gradient: (f64, &[f64]), field: &[f64]) -> f64 {
+        let rate = gradient.0 + dot(gradient.1, field);
+        let moving = field
+            .iter()
+            .zip(x)
+            .enumerate()
+            .filter(|(_, (f, _))| **f != 0.0);
+        let parts = moving.map(|(i, (f, x))| (f / self.of(i, *x)).powi(2));
+        let speed = (self.span.powi(-2) + parts.sum::<f64>()).sqrt();
+        self.length(x, gradient) * speed / rate.abs()
     }
 }
 
@@ -129,11 +135,7 @@ impl Instant<'_, '_> {
             Ok(time) => time,
             Err(lost) => return Ok(Err(lost)),
         };
-        let fields = [&self.before.field, &self.after.field];
-        if fields
-            .iter()
-            .any(|field| matches!(field, ModeField::Reduced(_) | ModeField::Rest(_)))
-        {
+        if self.before.is_unsupported() || self.after.is_unsupported() {
             return Ok(Err(Lost::Unsupported));
         }
         let mut passage = Passage {
@@ -217,7 +219,16 @@ impl Instant<'_, '_> {
         let values = self.extended.values.iter().map(|p| 1.0 + p.abs());
         let moved = by_parameters.zip(values).map(|(g, p)| (g * p).abs());
         let is_moved = touches && moved.sum::<f64>() * AT_SIDE > rate.abs() * weights.span;
-        if !is_regular || is_moved {
+        // A multiplier is of size 1. Where it is so steep, or where the equations of an affine field become singular, it is a
+        // quotient of two functions that vanish, and neither it nor the field before is known.
+        let is_pole = match guard {
+            Guard::Multiplier { .. } => {
+                weights.length(record.x[0], (timing.time, states)) > 1.0 / AT_SIDE
+            }
+            Guard::Root(RootEnd::Fold) => self.before.is_affine,
+            _ => false,
+        };
+        if !is_regular || is_moved || is_pole {
             return Ok(Err(Lost::Grazing));
         }
         Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))
@@ -304,12 +315,12 @@ impl Instant<'_, '_> {
         }
     }
 
-    /// Does sliding on one surface end on the other side than its multiplier tells? So it is where the fields of both sides become
-    /// tangent to the surface.
+    /// Does sliding on a surface end on the other side than its multiplier tells? So it is where the fields of both sides become
+    /// tangent to the surface, and the multiplier, the quotient of two functions that vanish, does not fix the time.
     fn leaves_at_two_fold(&self) -> bool {
         let record = self.record;
-        match (record.guards, &self.before.sliding[..]) {
-            (&[Guard::Multiplier { surface, end }], [_]) => {
+        match *record.guards {
+            [Guard::Multiplier { surface, end }] => {
                 record.acts.is_empty() && record.mode[1].entries()[surface] == -end
             }
             _ => false,

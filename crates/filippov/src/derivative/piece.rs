@@ -6,7 +6,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::change::{Change, Row, Rows};
-use super::collocation::{operations, Collocation};
+use super::collocation::{fastest, operations, Collocation};
 use super::extended::Extended;
 use super::forms::{add, form_by_differences, is_known, pairs, Moved, Second};
 use super::radau::{INTEGRALS, NODES, STAGES};
@@ -16,7 +16,6 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, Guard, Law, ModeField, SmoothField};
 use crate::options::{Options, SlidingRule};
-use crate::sparse::SparseRows;
 use crate::stepper::Taylor;
 use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
@@ -482,7 +481,7 @@ impl<'a> Piece<'a> {
         let n = self.extended.n;
         path(0.5 * (t0 + t1), &mut self.point[..n])?;
         self.slopes(0, 0.5 * (t0 + t1))?;
-        let fastest = fastest(self.nodes[0].rows(), n);
+        let fastest = fastest(self.nodes[0].rows(), (n, self.point.len() - n));
         // NaN becomes one part, and stays NaN.
         let parts = ((t1 - t0) * fastest / self.longest).ceil();
         let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
@@ -640,12 +639,22 @@ impl<'a> Piece<'a> {
         Ok(Timing { time, state })
     }
 
-    /// Does a multiplier stay at the end of its interval, to first order? A motion beside this one leaves on one side, and slides on the
-    /// other.
+    /// Is it a motion whose changes are not followed: on a surface of higher relative degree, or at rest where its fields are not
+    /// regular?
+    pub fn is_unsupported(&self) -> bool {
+        matches!(self.field, ModeField::Reduced(_) | ModeField::Rest(_))
+    }
+
+    /// Does a multiplier stay at the end of its interval, to first order, or is it not known? A motion beside this one leaves on one
+    /// side, and slides on the other.
     pub fn stays_at_an_end(&mut self, t: f64, z: &[f64]) -> Result<bool, FieldError> {
         let field = self.rates(t, z)?;
+        let multipliers = self.field.multipliers();
+        if multipliers.iter().any(|l| !l.is_finite()) {
+            return Ok(true);
+        }
         let at_end = |l: &f64| (l.abs() - 1.0).abs() <= AT_SIDE;
-        let Some(k) = self.field.multipliers().iter().position(at_end) else {
+        let Some(k) = multipliers.iter().position(at_end) else {
             return Ok(false);
         };
         let slopes = match self.sliding.get(k) {
@@ -736,18 +745,4 @@ impl<'a> Piece<'a> {
 fn is_affine(system: &TracedSystem, sliding: &[usize]) -> bool {
     let known = system.affine_signs();
     known.is_some_and(|affine| affine.affine_parts(sliding).is_some())
-}
-
-/// The root of the largest sum of the absolute values of a row of F_x^2: at least the fastest rate.
-fn fastest(rows: &SparseRows, n: usize) -> f64 {
-    let (mut product, mut most) = (vec![0.0; n], 0.0_f64);
-    for r in 0..n {
-        product.fill(0.0);
-        for (k, factor) in rows.row(r).filter(|(c, _)| *c < n) {
-            let entries = rows.row(k).filter(|(c, _)| *c < n);
-            entries.for_each(|(c, value)| product[c] += factor * value);
-        }
-        most = most.max(product.iter().map(|v| v.abs()).sum());
-    }
-    most.sqrt()
 }

@@ -228,6 +228,9 @@ impl<'a> Tangents<'a> {
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
+        if piece.is_unsupported() {
+            self.lose(t, Lost::Unsupported);
+        }
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
