@@ -66,18 +66,34 @@ pub(super) fn fastest(rows: &SparseRows, (n, m): (usize, usize)) -> f64 {
     if rows.n_rows() == n + m {
         return fastest_in_region(rows, n);
     }
-    let node = Node::of(rows, (n, m));
-    let no_shares = vec![0.0; node.rows.n_rows()];
-    let size = |change: &[f64]| change.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let (l, width) = (rows.n_rows() - n - m, n + m);
+    let mut matrix = SparseRows::new(l);
+    for k in 0..l {
+        let own = rows.row(width + k).filter(|(c, _)| *c >= width);
+        matrix.push_row(own.map(|(c, value)| (c - width, value)));
+    }
+    let mut solver = SparseSolver::for_all_pivots();
+    if !matrix.is_finite() || solver.factor(&matrix).is_err() {
+        return f64::NAN;
+    }
+    let size = |change: &[f64]| {
+        change[..n]
+            .iter()
+            .fold(0.0_f64, |most, v| most.max(v.abs()))
+    };
     // Any change has a part in all directions.
-    let start: Vec<f64> = (0..n).map(|i| 1.0 + 0.3 * (1.0 + i as f64).sin()).collect();
-    let (mut change, mut rates) = (start.clone(), vec![0.0; n]);
-    let mut most = 0.0_f64;
+    let start = (0..n).map(|i| 1.0 + 0.3 * (1.0 + i as f64).sin());
+    let mut change: Vec<f64> = start.chain(vec![0.0; m + l]).collect();
+    let (at_start, mut most) = (size(&change), 0.0_f64);
     for power in 1..=FASTEST_POWER {
-        node.rates(&change, &no_shares, &mut rates);
-        std::mem::swap(&mut change, &mut rates);
+        change[width..].fill(0.0);
+        let mut multipliers: Vec<f64> = (0..l).map(|k| -rows.dot(width + k, &change)).collect();
+        solver.solve(&mut multipliers);
+        change[width..].copy_from_slice(&multipliers);
+        let rates: Vec<f64> = (0..n).map(|r| -rows.dot(r, &change)).collect();
+        change[..n].copy_from_slice(&rates);
         if power > 1 {
-            most = most.max((size(&change) / size(&start)).powf(1.0 / f64::from(power)));
+            most = most.max((size(&change) / at_start).powf(1.0 / f64::from(power)));
         }
     }
     most
