@@ -10,7 +10,9 @@ use filippov::{
 };
 use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -405,6 +407,40 @@ impl TracedSystem {
         let all = surface_values_of(py, (&system, &q), t, &x, &signs)?;
         let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
         Ok(PyArray1::from_vec(py, visible))
+    }
+
+    /// The field and behind it the switching functions at several places, a row for each.
+    fn right_hand_sides<'py>(
+        &self,
+        py: Python<'py>,
+        times: Array<'py>,
+        states: PyReadonlyArray2<'py, f64>,
+        signs: PyReadonlyArray2<'py, f64>,
+        p: Array<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let system = self.with(p.as_slice()?);
+        let (n, n_visible) = (system.n_states(), self.n_visible());
+        let (times, places) = (times.as_slice()?, [states.shape(), signs.shape()]);
+        if places != [[times.len(), n], [times.len(), n_visible]] {
+            let text = format!("states and signs have the shapes {places:?}");
+            return Err(PyValueError::new_err(text));
+        }
+        let (states, signs) = (states.as_slice()?, signs.as_slice()?);
+        let mut h = vec![0.0; system.n_surfaces()];
+        let mut rows = Vec::with_capacity(times.len());
+        for (k, &t) in times.iter().enumerate() {
+            let x = &states[k * n..][..n];
+            let q = self.laws.start(&system, t, x).map_err(raised)?;
+            let seen = &signs[k * n_visible..][..n_visible];
+            let all = self.all_signs((&system, &q), t, x, seen).map_err(raised)?;
+            let place = Setting::new(&all, &q).at(t, x);
+            let mut row = vec![0.0; n];
+            system.field(&place, &mut row).map_err(raised)?;
+            system.surfaces(&place, &mut h).map_err(raised)?;
+            row.extend_from_slice(&h[..n_visible]);
+            rows.push(row);
+        }
+        Ok(PyArray2::from_vec2(py, &rows)?)
     }
 
     /// The signs and the field at a point on no surface: see `field_off_surfaces` of the core.

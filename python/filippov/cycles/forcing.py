@@ -28,29 +28,41 @@ _PLACES, _CONFIRMED_AT, _MOST_MULTIPLES, _WINDOW = 7, 3, 64, 4000
 _GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 
-@lru_cache(maxsize=16)
-def _places(n: int, m: int) -> list[tuple[float, Array, Array]]:
+@lru_cache(maxsize=32)
+def _places(n: int, m: int, count: int) -> tuple[Array, Array, Array]:
     """Return times (as multiples of a unit), states and signs at which to evaluate a right-hand side."""
     random = np.random.default_rng(20)
-    return [
+    places = [
         (random.uniform(0.0, 1.0), random.uniform(-1.0, 1.0, n), random.choice([-1.0, 1.0], m))
-        for _ in range(_PLACES)
+        for _ in range(count)
     ]
+    times, states, signs = zip(*places, strict=True)
+    return np.array(times), np.array(states), np.array(signs)
 
 
-def _samples(motions: Motions) -> list[tuple[float, Array, Array]]:
-    return _places(motions.n, motions.prepared.core.n_surfaces)
+class _Samples:
+    """Field and switching functions at some places."""
+
+    def __init__(self, motions: Motions, count: int = _PLACES) -> None:
+        places = _places(motions.n, motions.prepared.core.n_surfaces, count)
+        self._motions, (self.units, self._states, self._signs) = motions, places
+
+    def at(self, times: Array) -> Array:
+        """Return them at a time for each place, a row for each."""
+        return self._motions.right_hand_sides(times, self._states, self._signs)
+
+    def difference(self, times: Array, period: float) -> Array:
+        """Return their differences over one period that are known."""
+        found = self.at(times + period) - self.at(times)
+        return np.asarray(found[np.isfinite(found)])
 
 
 def depends_on_time(motions: Motions, scale: float) -> bool:
     """Whether field or switching functions contain the time; `scale` is a span of it."""
-    for u, x, signs in _samples(motions):
-        first = motions.right_hand_side(0.0, x, signs)
-        for k in range(1, 4):
-            later = motions.right_hand_side(k * u * scale, x, signs)
-            if not np.array_equal(first, later, equal_nan=True):
-                return True
-    return False
+    samples = _Samples(motions)
+    first = samples.at(0.0 * samples.units)
+    later = [samples.at(k * scale * samples.units) for k in range(1, 4)]
+    return not all(np.array_equal(first, one, equal_nan=True) for one in later)
 
 
 class GivenPeriod:
@@ -204,12 +216,8 @@ def _slope(function: Callable[[float], Array], d: float) -> Array:
 
 def _difference(motions: Motions, period: float) -> Array:
     """Return the differences of field and switching functions over one period, at several places."""
-    parts = []
-    for u, x, signs in _samples(motions):
-        t = u * period
-        parts.append(motions.right_hand_side(t + period, x, signs) - motions.right_hand_side(t, x, signs))
-    found = np.concatenate(parts)
-    return found[np.isfinite(found)]
+    samples = _Samples(motions)
+    return samples.difference(period * samples.units, period)
 
 
 def _refined(motions: Motions, guess: float) -> float:
@@ -234,11 +242,8 @@ def _refined(motions: Motions, guess: float) -> float:
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    places = _samples(motions)[:_CONFIRMED_AT]
-    now, later = (
-        np.concatenate([motions.right_hand_side(u * period + wait, x, signs) for u, x, signs in places])
-        for wait in (0.0, period)
-    )
+    samples = _Samples(motions, _CONFIRMED_AT)
+    now, later = (samples.at(period * samples.units + wait) for wait in (0.0, period))
     is_finite = np.isfinite(now) & np.isfinite(later)
     now, later = now[is_finite], later[is_finite]
     size = max(1.0, float(abs(now).max(initial=0.0)))
@@ -246,8 +251,8 @@ def _repeats(motions: Motions, period: float) -> bool:
 
 
 def _size(motions: Motions) -> float:
-    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)]
-    found = np.abs(np.concatenate(values))
+    samples = _Samples(motions)
+    found = np.abs(samples.at(samples.units))
     return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
 
 
@@ -309,8 +314,5 @@ def common_period(motions: Motions, ticks: float) -> float:
 
 
 def _difference_from_start(motions: Motions, period: float) -> Array:
-    parts = []
-    for u, x, signs in _samples(motions)[:3]:
-        parts.append(motions.right_hand_side(u + period, x, signs) - motions.right_hand_side(u, x, signs))
-    found = np.concatenate(parts)
-    return found[np.isfinite(found)]
+    samples = _Samples(motions, _CONFIRMED_AT)
+    return samples.difference(samples.units, period)

@@ -329,6 +329,10 @@ class Motions:
         field = self._core.field(t, x, signs, self._vector)
         return np.concatenate([field, self._core.surface_values(t, x, signs, self._vector)])
 
+    def right_hand_sides(self, times: Array, states: Array, signs: Array) -> Array:
+        """Return the same at several places, a row for each."""
+        return self._core.right_hand_sides(times, states, signs, self._vector)
+
     def _motions(self) -> HeldMotions:
         if self._held is None:
             places = [list(self._params).index(name) for name in self._by]
