@@ -143,3 +143,24 @@ def test_sliding_goes_on_where_the_jump_comes_back_with_its_sign(method: str) ->
     assert sol.success, sol.message
     assert str(sol.segments[-1].mode) == "00"
     np.testing.assert_allclose(sol.y[:, -1], 0.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("method", ["auto", "Taylor"])
+def test_a_jump_that_vanishes_while_two_surfaces_are_slid_on(method: str, tolerance: float) -> None:
+    """The motion leaves below; where guards vanish again and again before it does, a viable mode follows."""
+
+    def field(t: float, x: Any) -> Any:
+        first, second = np.sign(0.862 * x[2] - 0.796 * x[1] + 0.965 * x[0] - 0.64), np.sign(x[1] + 0.503)
+        wave = 0.45 * np.cos(0.474 * t + x[1]) - 0.83 * second * np.cos(1.57 * t + x[2])
+        return [
+            -0.8 * x[0] + 0.59 * x[2] - x[1] / (1 + x[0] ** 2) - 1.1 * first + 0.28,
+            -0.5 * x[1] + 1.261 * x[2] - 0.3 * x[0] / (1 + x[2] ** 2) + wave,
+            -x[2] - 0.643 * x[0] - 0.2 * x[2] ** 3 - 0.78 * (0.298 * x[2] - 0.16) - 0.85 * second,
+        ]
+
+    sol = fl.solve_ivp(
+        field, (0, 1.35), [-0.286, -0.8, -0.214], method=method, rtol=tolerance, atol=tolerance
+    )
+    assert sol.success
+    np.testing.assert_allclose(sol.y[:, -1], [0.55426502, -0.50507995, -0.34444245], atol=1e-7)

@@ -1,5 +1,6 @@
 //! Limits of infinitely many switches or impacts in finite time, and what follows there.
 
+use super::germs::decide_undecided;
 use super::point::{Decided, Lefts, Next, Notes, Point, Values};
 use super::rule::{How, Meeting};
 use crate::cube::least_multipliers;
@@ -363,7 +364,8 @@ pub(crate) fn limit_here(at: &Point, meeting: &[usize]) -> Result<Option<Limit>,
     Ok(Some(limit))
 }
 
-/// Rule: a limit of infinitely many switches, where the motion slides on all surfaces if that is possible.
+/// Rule: a limit of infinitely many switches, where the motion slides on all surfaces if that is possible. Where all fields are
+/// tangent to one of them, it goes on in a viable mode.
 pub(super) fn stay_at_limit(
     at: &Point,
     notes: &mut Notes,
@@ -372,7 +374,12 @@ pub(super) fn stay_at_limit(
     if meeting.how != How::Limit || meeting.surfaces.len() == 1 {
         return Ok(None);
     }
-    stay_on_all(at, notes, meeting)
+    match stay_on_all(at, notes, meeting)? {
+        Some(Err(Stop::Intersection { reason, .. })) => {
+            decide_undecided(at, notes, meeting, Some(reason)).map(Some)
+        }
+        decided => Ok(decided),
+    }
 }
 
 /// The motion that stays on all surfaces of a meeting, if there is one; why it cannot be known.
