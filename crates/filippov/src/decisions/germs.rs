@@ -7,6 +7,7 @@ use super::choice::choose;
 use super::consistency::{bends, with_those_that_jump};
 use super::first_order::hidden_limit;
 use super::leave_by_rule::slides_by_rule;
+use super::limits::stay_on_all;
 use super::point::{Decided, Notes, Point};
 use super::rest::stay_if_nothing_leaves;
 use super::rule::{How, Meeting};
@@ -68,6 +69,24 @@ pub(super) fn decide_if_doubtful(
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
     Ok(decide_by_germs(at, notes, meeting)?.ok())
+}
+
+/// Rule: a limit of infinitely many switches, where the motion slides on all surfaces if that is possible. Where all fields are
+/// tangent to one of them, it goes on in a viable mode.
+pub(super) fn stay_at_limit(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    if meeting.how != How::Limit || meeting.surfaces.len() == 1 {
+        return Ok(None);
+    }
+    match stay_on_all(at, notes, meeting)? {
+        Some(Err(Stop::Intersection { reason, .. })) => {
+            decide_undecided(at, notes, meeting, Some(reason)).map(Some)
+        }
+        decided => Ok(decided),
+    }
 }
 
 /// What follows at an intersection of which first-order data do not decide; why, if that is known. Rest comes first where a

@@ -1,8 +1,7 @@
 //! Limits of infinitely many switches or impacts in finite time, and what follows there.
 
-use super::germs::decide_undecided;
 use super::point::{Decided, Lefts, Next, Notes, Point, Values};
-use super::rule::{How, Meeting};
+use super::rule::Meeting;
 use crate::cube::least_multipliers;
 use crate::error::FieldError;
 use crate::error::Undecided;
@@ -362,24 +361,6 @@ pub(crate) fn limit_here(at: &Point, meeting: &[usize]) -> Result<Option<Limit>,
     };
     project(at, &mut limit)?;
     Ok(Some(limit))
-}
-
-/// Rule: a limit of infinitely many switches, where the motion slides on all surfaces if that is possible. Where all fields are
-/// tangent to one of them, it goes on in a viable mode.
-pub(super) fn stay_at_limit(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    if meeting.how != How::Limit || meeting.surfaces.len() == 1 {
-        return Ok(None);
-    }
-    match stay_on_all(at, notes, meeting)? {
-        Some(Err(Stop::Intersection { reason, .. })) => {
-            decide_undecided(at, notes, meeting, Some(reason)).map(Some)
-        }
-        decided => Ok(decided),
-    }
 }
 
 /// The motion that stays on all surfaces of a meeting, if there is one; why it cannot be known.

@@ -2,9 +2,8 @@
 
 use super::event::{touch, touches};
 use super::germ::surfaces_left;
-use super::germs::{decide_if_doubtful, decide_if_entangled};
+use super::germs::{decide_if_doubtful, decide_if_entangled, stay_at_limit};
 use super::leave_by_rule::leave_by_rule;
-use super::limits::stay_at_limit;
 use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
