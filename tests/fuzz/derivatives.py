@@ -173,9 +173,10 @@ def compare(seed: int) -> Compared:
         confirmed |= not is_smooth
         if not np.isfinite(own).all():
             continue
-        # What is named may be of the side whose differences settle with the root of their length only.
-        is_open = is_corner or (is_named and None in sides)
-        if not near or (not agrees and is_open):
+        if is_named and not agrees:
+            open_sides = [k for k in (0, 1) if sides[k] is None]
+            agrees = any(_come_to([q[side] for q in quotients], own) for side in open_sides)
+        if not near or (not agrees and is_corner):
             found.unsettled.append(column)
         elif not agrees:
             found.wrong.append(f"d/d{column}: {own} is not {near[0][0]}, known to {near[0][1]:.1e}")
@@ -229,6 +230,13 @@ def _settled(quotients: list[_Quotient]) -> tuple[Array, float] | None:
         if error < 1e-2 * size and (best is None or error < best[1]):
             best = now.value, error
     return best
+
+
+def _come_to(quotients: list[_Quotient], value: Array) -> bool:
+    """Do quotients come to a value with the root of their length, as long as they are more than noise?"""
+    gaps = [np.abs(one.value - value).max() for one in quotients]
+    steps = zip(itertools.pairwise(gaps), quotients[1:], strict=True)
+    return all(now <= max(0.5 * before, one.noise) for (before, now), one in steps)
 
 
 def _has_no_kink(quotients: list[tuple[_Quotient, _Quotient]]) -> bool:
