@@ -33,7 +33,7 @@ pub(crate) use small_matrix::{invert, Elimination};
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{
     has_one_mode_only, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
-    stability_margins,
+    stability_margins, uncoupled_margins,
 };
 
 #[cfg(test)]

@@ -147,6 +147,8 @@ struct Pivots<'a> {
     /// nu, and N where it is damped, with d.
     nu: Vec<f64>,
     damped: Option<SparseRows>,
+    /// No sign has an effect on the rate of another surface.
+    is_diagonal: bool,
     solver: SparseSolver,
     n_pivots: usize,
     patience: Patience<'a>,
@@ -171,6 +173,7 @@ impl<'a> Pivots<'a> {
         Pivots {
             nu: problem.nu.clone(),
             damped: None,
+            is_diagonal: problem.n.is_diagonal(),
             problem,
             is_idle,
             uniqueness,
@@ -292,9 +295,19 @@ impl<'a> Pivots<'a> {
             .map(|&i| -self.nu[i] - self.n().dot(i, &signs))
             .collect();
         self.n_pivots += 1;
-        let equations = self.n().principal(&sliding);
-        self.solver.factor(&equations)?;
-        self.solver.solve(&mut unknown);
+        if self.is_diagonal {
+            for (&i, sign) in sliding.iter().zip(&mut unknown) {
+                let own = self.n().diagonal(i);
+                if own == 0.0 {
+                    return Err(Singular { unknowns: vec![i] });
+                }
+                *sign /= own;
+            }
+        } else {
+            let equations = self.n().principal(&sliding);
+            self.solver.factor(&equations)?;
+            self.solver.solve(&mut unknown);
+        }
         for (&i, &sign) in sliding.iter().zip(&unknown) {
             signs[i] = sign;
         }

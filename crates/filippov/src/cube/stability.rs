@@ -96,6 +96,15 @@ pub fn stability_margins(scaled: &Matrix, in_parts: bool) -> [f64; 2] {
     margins
 }
 
+/// The [`stability_margins`] of a diagonal matrix, with its rows scaled and its zeros those of the structure.
+pub fn uncoupled_margins(scaled: impl Iterator<Item = f64>) -> [f64; 2] {
+    let least = |least: f64, entry: f64| match -entry {
+        fold if fold.is_nan() || fold < least => fold,
+        _ => least,
+    };
+    [scaled.fold(f64::INFINITY, least), 1.0]
+}
+
 /// -ln of the spectral radius of (c + A)(c - A)^-1, c the size of A: positive if and only if all eigenvalues have
 /// negative real parts. By repeated squaring; NaN if A has the eigenvalue c.
 fn decay(matrix: &Matrix) -> f64 {

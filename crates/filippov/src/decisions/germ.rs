@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::powers::power;
-use crate::system::{dot, MotionJets};
+use crate::system::{dot, AffineParts, MotionJets};
 use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
 
 /// How a guard begins.
@@ -145,13 +145,22 @@ impl MotionSeries {
     }
 }
 
+/// What a rule knows of the motion that follows.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Found<'f> {
+    /// Its multipliers; none if they are not known.
+    pub multipliers: &'f [f64],
+    /// The fields around the point, evaluated there with its signs on all surfaces that are not among theirs.
+    pub parts: Option<&'f AffineParts>,
+}
+
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
 pub(crate) fn surfaces_left(
     at: &Point,
     notes: &mut Notes,
     after: &Mode,
     meeting: &[usize],
-    multipliers: &[f64],
+    found: Found<'_>,
 ) -> Result<Lefts, FieldError> {
     let mut left: Lefts = smallvec![];
     let leaving: Vec<usize> = meeting
@@ -162,12 +171,28 @@ pub(crate) fn surfaces_left(
     if leaving.is_empty() {
         return Ok(left);
     }
-    let signs = after.signs();
-    let velocity = at.velocity(notes, after, multipliers)?;
+    let (signs, multipliers) = (after.signs(), found.multipliers);
     // At the exit of a multiplier all forces may balance, and nothing of the motion itself tells how large they are.
     let mut around: Vec<usize> = leaving.iter().copied().chain(after.sliding_set()).collect();
     around.sort_unstable();
-    let sizes = component_sizes(at, notes, after, &around)?;
+    let known = found.parts.filter(|parts| parts.surfaces() == around);
+    let own = match known {
+        Some(_) => None,
+        None => parts_around(at, notes, &signs, &around)?,
+    };
+    let parts = known.or(own.as_ref());
+    // The strength of a contact that sticks is not that with which it slips.
+    let is_combination = multipliers.len() == after.codimension()
+        && at.slides_on_roots(after)
+        && !leaving.iter().any(|&j| at.system.sticks_at(j));
+    let velocity = match parts {
+        Some(parts) if is_combination => velocity_at(parts, &signs, multipliers),
+        _ => at.velocity(notes, after, multipliers)?,
+    };
+    let sizes = match parts {
+        Some(parts) => sizes_of_rates(parts),
+        None => component_sizes(at, notes, after, &around)?,
+    };
     for j in leaving {
         let (value, size) = at.rate_of(j, &signs, &velocity)?;
         let place = around.binary_search(&j).unwrap_or(0);
@@ -191,22 +216,49 @@ pub(crate) fn surfaces_left(
     Ok(left)
 }
 
-/// The largest component normal to each of these surfaces among the fields around them, or a bound of it where the field is
-/// affine in their signs; 0 where the fields are too many to be looked at, or not finite.
+/// The fields around these surfaces where the others have these signs; `None` if they are not affine in theirs.
+fn parts_around(
+    at: &Point,
+    notes: &mut Notes,
+    signs: &[f64],
+    surfaces: &[usize],
+) -> Result<Option<AffineParts>, FieldError> {
+    let affine = at.system.affine_signs();
+    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
+    let Some((affine, mut parts)) = parts else {
+        return Ok(None);
+    };
+    notes.n_field_evaluations += parts.evaluate(affine, &at.place(signs))?;
+    Ok(Some(parts))
+}
+
+/// The velocity with these signs, and with these multipliers on the surfaces where they are 0.
+fn velocity_at(parts: &AffineParts, signs: &[f64], multipliers: &[f64]) -> Vec<f64> {
+    let mut multipliers = multipliers.iter();
+    let own = parts.surfaces().iter().map(|&j| match signs[j] {
+        0.0 => multipliers.next().copied().unwrap_or(f64::NAN),
+        sign => sign,
+    });
+    let mut velocity = vec![0.0; parts.field.len()];
+    parts.combine(&own.collect::<Values>(), &mut velocity);
+    velocity
+}
+
+/// For each surface a bound of its rate in the fields around it.
+fn sizes_of_rates(parts: &AffineParts) -> Values {
+    let spread = |row| parts.normal().row(row).map(|(_, n)| n.abs()).sum::<f64>();
+    let rows = parts.nu().into_iter().enumerate();
+    rows.map(|(row, nu)| nu.abs() + spread(row)).collect()
+}
+
+/// The largest component normal to each of these surfaces among the fields around them; 0 where these are too many to be looked at, or
+/// not finite.
 fn component_sizes(
     at: &Point,
     notes: &mut Notes,
     mode: &Mode,
     surfaces: &[usize],
 ) -> Result<Values, FieldError> {
-    let affine = at.system.affine_signs();
-    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
-    if let Some((affine, mut parts)) = parts {
-        notes.n_field_evaluations += parts.evaluate(affine, &at.place(&mode.signs()))?;
-        let spread = |row| parts.normal().row(row).map(|(_, n)| n.abs()).sum::<f64>();
-        let rows = parts.nu().into_iter().enumerate();
-        return Ok(rows.map(|(row, nu)| nu.abs() + spread(row)).collect());
-    }
     let groups = at.system.sign_groups(surfaces);
     if groups.iter().any(|group| group.len() > MOST_MEETING) {
         return Ok(smallvec![0.0; surfaces.len()]);

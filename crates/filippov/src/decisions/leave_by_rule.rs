@@ -1,7 +1,7 @@
 //! Sliding on an intersection by another rule than the canopy: where it begins and ends.
 
 use super::choice::choose;
-use super::germ::surfaces_left;
+use super::germ::{surfaces_left, Found};
 use super::point::{Arrival, Decided, Next, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
@@ -70,7 +70,7 @@ pub(crate) fn leave_by_rule(
             }
         }
     };
-    let left = surfaces_left(at, notes, &after, meeting.surfaces, &[])?;
+    let left = surfaces_left(at, notes, &after, meeting.surfaces, Found::default())?;
     Ok(Some(Ok(Next::new(after, left))))
 }
 

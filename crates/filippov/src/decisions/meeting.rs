@@ -3,7 +3,7 @@
 use super::choice::{asked, choose};
 use super::consistency::agreeing_with_own_signs;
 use super::first_order::resolution;
-use super::germ::surfaces_left;
+use super::germ::{surfaces_left, Found};
 use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
@@ -99,7 +99,16 @@ fn follow(
     let left = match &leap {
         // What it leaves is known at the end of the leap.
         Some(_) => Lefts::new(),
-        None => surfaces_left(at, notes, &after, meeting, multipliers)?,
+        None => surfaces_left(
+            at,
+            notes,
+            &after,
+            meeting,
+            Found {
+                multipliers,
+                ..Found::default()
+            },
+        )?,
     };
     let mut next = Next::new(after, left);
     let oscillates = next.mode == preferred && resolution.oscillates;

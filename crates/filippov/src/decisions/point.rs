@@ -11,7 +11,7 @@ use crate::mode::{Mode, Signs};
 use crate::motion::Deflation;
 use crate::motion::{ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::motion::{Leading, TwoFoldMotion};
-use crate::options::{NonUnique, Options};
+use crate::options::{NonUnique, Options, SlidingRule};
 use crate::patience::Patience;
 use crate::status::{Stop, Warning};
 use crate::switch::Switch;
@@ -197,6 +197,19 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
             }
         }
         field
+    }
+
+    /// Does a motion in this mode slide on its surfaces as the combination of the fields around them with its multipliers?
+    pub fn slides_on_roots(&self, mode: &Mode) -> bool {
+        let (law, sliding) = (&self.policy.law, mode.sliding_set());
+        mode.codimension() > 0
+            && law.rule == SlidingRule::Canopy
+            && law.restoring.is_none()
+            && self.actions.list.is_empty()
+            && self
+                .system
+                .reduced(&sliding.collect::<SmallVec<[usize; 8]>>())
+                .is_none()
     }
 
     /// The velocity of a motion in this mode.

@@ -2,7 +2,7 @@
 
 use super::choice::choose;
 use super::consistency::agreeing_with_own_signs;
-use super::germ::surfaces_left;
+use super::germ::{surfaces_left, Found};
 use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
@@ -14,7 +14,7 @@ use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::sparse::SparseRows;
 use crate::status::Stop;
-use crate::system::dot;
+use crate::system::{dot, AffineParts};
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
 
 /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
@@ -36,13 +36,20 @@ pub(super) fn decide_by_relay(
         return Ok(None);
     }
     let mut found = relay_at(at, notes, meeting, false)?;
-    let is_open = |(found, _): &(RelaySolution, bool)| {
+    let is_open = |posed: &Posed| {
+        let found = &posed.solution;
         !found.degenerate.is_empty() || !found.loops.is_empty()
     };
-    if is_event && found.as_ref().is_some_and(is_open) {
+    let is_late = is_event && found.as_ref().is_some_and(is_open);
+    if is_late {
         found = relay_at(at, notes, meeting, true)?;
     }
-    let Some((mut found, may_be_tangent)) = found else {
+    let Some(Posed {
+        parts,
+        solution: mut found,
+        may_be_tangent,
+    }) = found
+    else {
         return Ok(None);
     };
     let is_silent = |around: &Surroundings| around.has_silent(at);
@@ -77,7 +84,12 @@ pub(super) fn decide_by_relay(
     let signs = found.signs.iter().zip(&found.modes);
     let sliding = signs.filter(|(_, &mode)| mode == 0);
     let multipliers: Vec<f64> = sliding.map(|(&sign, _)| sign).collect();
-    let left = surfaces_left_or_caught(at, notes, &mut after, surfaces, &multipliers)?;
+    let is_as_posed = !is_late && after == meeting.on_all(&Mode::new(found.modes.clone()));
+    let found = Found {
+        multipliers: &multipliers,
+        parts: is_as_posed.then_some(&parts),
+    };
+    let left = surfaces_left_or_caught(at, notes, &mut after, surfaces, found)?;
     Ok(Some(Ok(Next::new(after, left))))
 }
 
@@ -87,9 +99,9 @@ fn surfaces_left_or_caught(
     notes: &mut Notes,
     after: &mut Mode,
     meeting: &[usize],
-    multipliers: &[f64],
+    found: Found<'_>,
 ) -> Result<Lefts, FieldError> {
-    let mut left = surfaces_left(at, notes, after, meeting, multipliers)?;
+    let mut left = surfaces_left(at, notes, after, meeting, found)?;
     for _ in meeting {
         let is_wrong = |left: &&Left| {
             let entry = left.surface().map_or(0, |j| after.entries()[j]);
@@ -101,7 +113,7 @@ fn surfaces_left_or_caught(
             break;
         }
         wrong.iter().for_each(|&j| after.set(j, 0));
-        left = surfaces_left(at, notes, after, meeting, &[])?;
+        left = surfaces_left(at, notes, after, meeting, Found::default())?;
     }
     Ok(left)
 }
@@ -123,15 +135,23 @@ fn let_go(at: &Point, mode: &Mode, meeting: &[usize], found: &mut RelaySolution)
     }
 }
 
-/// The solution of the relay problem of a meeting at the point, or a moment later along the motion that ends, and whether all
-/// fields around may be tangent to a surface: they cross it at a small part of their speed. `None` if the field is not
+/// A relay problem that was solved.
+struct Posed {
+    /// The fields around the place.
+    parts: AffineParts,
+    solution: RelaySolution,
+    /// All fields around may be tangent to a surface: they cross it at a small part of their speed.
+    may_be_tangent: bool,
+}
+
+/// The relay problem of a meeting at the point, or a moment later along the motion that ends. `None` if the field is not
 /// affine in the signs, or if no solution was found.
 fn relay_at(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
     is_late: bool,
-) -> Result<Option<(RelaySolution, bool)>, FieldError> {
+) -> Result<Option<Posed>, FieldError> {
     let affine = at.system.affine_signs();
     let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(meeting.surfaces)?)));
     let Some((affine, mut parts)) = parts else {
@@ -166,5 +186,9 @@ fn relay_at(
         let size = problem.nu[i].abs() + sum(&problem.n, i);
         size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
     });
-    Ok(Some((solution, may_be_tangent)))
+    Ok(Some(Posed {
+        parts,
+        solution,
+        may_be_tangent,
+    }))
 }

@@ -1,7 +1,7 @@
 //! Surfaces vanish together: the rules in their order, of which the first that applies answers.
 
 use super::event::{touch, touches};
-use super::germ::surfaces_left;
+use super::germ::{surfaces_left, Found};
 use super::germs::{decide_if_doubtful, decide_if_entangled, stay_at_limit};
 use super::leave_by_rule::leave_by_rule;
 use super::meeting::resolve_first_order;
@@ -147,7 +147,7 @@ fn with_kinetic_friction(
     }
     match place_on(at, notes, &next.mode, &others, Some(&next.mode))?.decided {
         Ok(again) if again.mode != next.mode => {
-            let left = surfaces_left(at, notes, &again.mode, meeting.surfaces, &[])?;
+            let left = surfaces_left(at, notes, &again.mode, meeting.surfaces, Found::default())?;
             Ok(Ok(Next::new(again.mode, left)))
         }
         _ => Ok(decided),

@@ -1,6 +1,6 @@
 //! Outward spirals: infinitely many laps from an intersection, started at a small distance.
 
-use super::germ::surfaces_left;
+use super::germ::{surfaces_left, Found};
 use super::point::{Leap, Lefts, Notes, Point};
 use super::surroundings::Surroundings;
 use crate::cube::Lap;
@@ -64,6 +64,12 @@ pub(crate) fn landing(
     let signs = leap.region.signs();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
     projector.project(at.system, leap.border, t, &mut x, at.setting(&signs))?;
-    let left = surfaces_left(&at.moved(t, &x), notes, &leap.region, &[leap.border], &[])?;
+    let left = surfaces_left(
+        &at.moved(t, &x),
+        notes,
+        &leap.region,
+        &[leap.border],
+        Found::default(),
+    )?;
     Ok(Landing { t, x, left })
 }

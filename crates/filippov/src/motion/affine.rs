@@ -1,7 +1,7 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
 use super::canopy::root_ends;
-use crate::cube::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
+use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
 use crate::sparse::SparseRows;
 use crate::system::{AffineParts, AffineSigns, OwnSetting, PiecewiseSystem, Setting};
@@ -63,6 +63,18 @@ impl<'a> AffineLaw<'a> {
     pub fn set_scaling(&mut self, kappa: &[f64]) {
         self.kappa.copy_from_slice(kappa);
         self.known_ends = None;
+    }
+
+    /// Starts anew on the same surfaces, with the signs of the others.
+    pub fn restart(&mut self, setting: Setting<'_>) {
+        self.setting.set(setting);
+        let surfaces = self.parts.surfaces();
+        surfaces.iter().for_each(|&j| self.setting.signs[j] = 0.0);
+        self.parts.restart();
+        self.sizes = None;
+        self.multipliers.fill(f64::NAN);
+        self.shared = None;
+        self.begin();
     }
 
     /// A motion begins.
@@ -172,6 +184,9 @@ impl<'a> AffineLaw<'a> {
     /// Those of the last evaluation.
     fn present_ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
         let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
+        if m > 2 && normal.is_diagonal() {
+            return uncoupled_margins((0..m).map(|i| self.kappa[i] * normal.diagonal(i)));
+        }
         let mut jacobian = Matrix::zeros(m);
         for i in 0..m {
             normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
@@ -227,8 +242,11 @@ impl<'a> AffineLaw<'a> {
                     entries.map(|(i, g)| g * (x[i] - start[i])).sum::<f64>()
                 });
                 let h = self.h[j] + moved;
+                if h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
+                    continue;
+                }
                 let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
-                if square == 0.0 || h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
+                if square == 0.0 {
                     continue;
                 }
                 is_near = false;

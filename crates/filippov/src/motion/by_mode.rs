@@ -98,11 +98,12 @@ impl<'a> ModeField<'a> {
         }
     }
 
-    /// Becomes the field of another mode of its kind; `false` if it is of another kind.
+    /// Becomes the field of another mode of its kind; `false` if it is of another kind, or slides on other surfaces where these are several.
     pub(crate) fn restart(&mut self, sliding: &[usize], setting: Setting<'_>) -> bool {
         match (self, sliding) {
             (ModeField::Region(field), []) => field.restart(setting),
             (ModeField::Sliding(field), &[j]) => field.restart(j, setting),
+            (ModeField::Intersection(field), set) => return field.restart(set, setting),
             _ => return false,
         }
         true
@@ -110,6 +111,15 @@ impl<'a> ModeField<'a> {
 }
 
 impl ModeField<'_> {
+    /// Is it worth to be kept for another motion?
+    pub(crate) fn is_lasting(&self) -> bool {
+        match self {
+            ModeField::Region(_) | ModeField::Sliding(_) => true,
+            ModeField::Intersection(field) => field.is_lasting(),
+            ModeField::Contact(_) | ModeField::Reduced(_) | ModeField::Rest(_) => false,
+        }
+    }
+
     /// The gradient of a guard by central differences: writes its derivatives by the states, and returns that by time. NaN if the
     /// motion has no such guard.
     ///

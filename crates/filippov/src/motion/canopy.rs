@@ -23,19 +23,14 @@ pub struct Canopy {
 }
 
 impl Canopy {
-    /// Room for the fields around the surfaces of `set`.
-    pub fn new(system: &dyn PiecewiseSystem, set: &[usize]) -> Self {
+    /// Room for the fields around the surfaces of `set`, scaled by `kappa`.
+    pub fn new(system: &dyn PiecewiseSystem, set: &[usize], kappa: &[f64]) -> Self {
         Canopy {
             fields: MeetingFields::new(system, set),
             weights: Vec::new(),
             telling: Vec::new(),
-            kappa: vec![1.0; set.len()],
+            kappa: kappa.to_vec(),
         }
-    }
-
-    /// Sets the scaling of the surfaces.
-    pub fn set_scaling(&mut self, kappa: &[f64]) {
-        self.kappa.copy_from_slice(kappa);
     }
 
     /// Evaluates all fields at a point of the intersection. Returns the number of evaluations.

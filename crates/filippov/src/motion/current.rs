@@ -17,6 +17,9 @@ use crate::system::{MotionJets, PiecewiseSystem, Setting};
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
 
+/// Fields that are kept of earlier motions.
+const MOST_IDLE: usize = 8;
+
 /// What follows from a mode alone, wherever its motion starts.
 #[derive(Clone)]
 struct KnownMode {
@@ -44,7 +47,7 @@ pub(crate) struct CurrentMotion<'a> {
     pub affine_bounds: Option<Option<AffineBounds>>,
     /// All of them are affine: the continuous extension of a step does not leave them.
     pub is_straight: bool,
-    /// Fields of other kinds that earlier motions had, kept for their buffers.
+    /// Fields of other kinds, or on other surfaces, that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     known: Vec<KnownMode>,
     /// Surfaces that need not be monitored for the time being.
@@ -190,7 +193,10 @@ impl<'a> CurrentMotion<'a> {
     /// Takes another field and keeps the one before, if it can be used again.
     fn replace_field(&mut self, field: ModeField<'a>) {
         let before = std::mem::replace(&mut self.field, field);
-        if matches!(before, ModeField::Region(_) | ModeField::Sliding(_)) {
+        if before.is_lasting() {
+            if self.idle.len() == MOST_IDLE {
+                self.idle.remove(0);
+            }
             self.idle.push(before);
         }
     }

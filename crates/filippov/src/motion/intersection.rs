@@ -32,7 +32,12 @@ pub struct IntersectionField<'a> {
     set: Vec<usize>,
     setting: OwnSetting,
     affine: Option<AffineLaw<'a>>,
+    /// Its space grows as the square of the number of surfaces: where there are many, only what needs it has it.
+    has_canopy: bool,
+    /// That of the set, once it was asked for.
     canopy: Option<Canopy>,
+    /// The scaling of the surfaces.
+    kappa: Vec<f64>,
     /// Another combination of the fields, if that was chosen.
     by_rule: Option<RuleLaw>,
     /// Why there is none, if one was chosen.
@@ -68,7 +73,6 @@ impl<'a> IntersectionField<'a> {
         lambda: &[f64],
     ) -> Self {
         let affine = AffineLaw::new(system, set, setting);
-        // Its space grows as the square of the number of surfaces: where there are many, only what needs it has it.
         let has_canopy = match affine {
             Some(_) => set.len() <= MOST_MEETING,
             None => {
@@ -81,7 +85,9 @@ impl<'a> IntersectionField<'a> {
             set: set.to_vec(),
             setting: OwnSetting::new(setting),
             affine,
-            canopy: has_canopy.then(|| Canopy::new(system, set)),
+            has_canopy,
+            canopy: None,
+            kappa: vec![1.0; set.len()],
             by_rule: None,
             refused: None,
             lambda: Vec::new(),
@@ -136,9 +142,7 @@ impl<'a> IntersectionField<'a> {
         if let Some(law) = &mut self.affine {
             law.set_scaling(kappa);
         }
-        if let Some(canopy) = &mut self.canopy {
-            canopy.set_scaling(kappa);
-        }
+        self.kappa.copy_from_slice(kappa);
         self
     }
 
@@ -148,6 +152,30 @@ impl<'a> IntersectionField<'a> {
         if let Some(law) = &mut self.affine {
             law.set_discrete(q);
         }
+    }
+
+    /// Starts anew on the same surfaces; `false` if these are others, or if all of it would have to be made anew.
+    pub fn restart(&mut self, set: &[usize], setting: Setting<'_>) -> bool {
+        if self.set != set || !self.is_lasting() {
+            return false;
+        }
+        if let Some(law) = &mut self.affine {
+            law.restart(setting);
+        }
+        self.setting.set(setting);
+        self.canopy = None;
+        self.lambda.clear();
+        self.exits.fill(f64::NAN);
+        self.slack.fill(0.0);
+        self.is_rootless = false;
+        self.n_evaluations = 0;
+        self.begin(&[], false);
+        true
+    }
+
+    /// Is it worth to be kept for another motion on the same surfaces?
+    pub fn is_lasting(&self) -> bool {
+        self.affine.is_some() && self.by_rule.is_none()
     }
 
     /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the
@@ -272,6 +300,9 @@ impl<'a> IntersectionField<'a> {
                 self.fill_exits(ends);
                 return Ok(());
             }
+        }
+        if self.has_canopy && self.canopy.is_none() {
+            self.canopy = Some(Canopy::new(self.system, &self.set, &self.kappa));
         }
         let found = match &mut self.canopy {
             Some(canopy) => {

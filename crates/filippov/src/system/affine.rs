@@ -201,6 +201,11 @@ impl AffineParts {
         self.is_steady && self.is_formed
     }
 
+    /// Forgets N: the signs of other surfaces may have changed.
+    pub(crate) fn restart(&mut self) {
+        (self.is_formed, self.is_factored) = (false, false);
+    }
+
     /// Moves the jumps from signs of size 1 to these sizes, one per surface.
     pub(super) fn stretch(&mut self, ratios: &[f64]) {
         self.jumps.scale_rows(ratios);

@@ -32,6 +32,8 @@ pub(super) struct AffineModel {
     time_rates: Vec<Source>,
     gradients: Vec<Row>,
     jumps: Vec<Row>,
+    /// Surfaces of which one of these entries is computed.
+    varies: Vec<bool>,
     /// Surfaces whose sign the field is multilinear in.
     is_blended: Vec<bool>,
     /// The gradient, and what the sign changes in the rates of switching functions, are the same all along every motion.
@@ -102,9 +104,15 @@ impl AffineModel {
             couplings: couplings(&graph, &dependence, &is_blended),
             ..SignDependence::default()
         };
+        let is_computed = |source: &Source| matches!(source, Source::Output(_));
+        let row_varies = |row: &Row| row.iter().any(|(_, source)| is_computed(source));
+        let varies = (0..d).map(|j| {
+            is_computed(&time_rates[j]) || row_varies(&gradients[j]) || row_varies(&jumps[j])
+        });
         AffineModel {
             coupled,
             in_gradient,
+            varies: varies.collect(),
             program: TieredProgram::new(graph.clone(), outputs, backend),
             graph,
             enclosing: rates.iter().map(|_| OnceLock::new()).collect(),
@@ -143,7 +151,14 @@ impl AffineModel {
             matrix
         };
         let (gradients, jumps) = (matrix(&self.gradients), matrix(&self.jumps));
-        Some(AffineParts::new(self.n_states, surfaces, gradients, jumps))
+        let mut parts = AffineParts::new(self.n_states, surfaces, gradients, jumps);
+        let own = parts.time_rates.iter_mut().zip(surfaces);
+        for (rate, &j) in own {
+            if let Source::Constant(value) = self.time_rates[j] {
+                *rate = value;
+            }
+        }
+        Some(parts)
     }
 
     /// These surfaces in groups whose signs multiply one another in the field.
@@ -195,8 +210,24 @@ impl AffineModel {
         Some(out[0])
     }
 
-    /// Evaluates everything that varies.
+    /// Evaluates what varies of [`parts`](Self::parts).
     pub fn fill(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts) {
+        self.fill_rows(place, parameters, parts, |j| self.varies[j]);
+    }
+
+    /// Evaluates everything, for parts whose jumps have been stretched.
+    pub fn fill_anew(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts) {
+        self.fill_rows(place, parameters, parts, |_| true);
+    }
+
+    /// Evaluates the field, and the rows of these surfaces.
+    fn fill_rows(
+        &self,
+        place: &Place<'_>,
+        parameters: &[f64],
+        parts: &mut AffineParts,
+        is_asked: impl Fn(usize) -> bool,
+    ) {
         let program = self.program.program();
         let mut outputs = std::mem::take(&mut parts.outputs);
         outputs.resize(program.n_outputs(), 0.0);
@@ -209,6 +240,11 @@ impl AffineModel {
         let (mut in_gradients, mut in_jumps) = (0, 0);
         for row in 0..parts.surfaces().len() {
             let j = parts.surfaces()[row];
+            if !is_asked(j) {
+                in_gradients += self.gradients[j].len();
+                in_jumps += self.jumps[j].len();
+                continue;
+            }
             parts.time_rates[row] = value(self.time_rates[j]);
             let gradients = &mut parts.gradients.values_mut()[in_gradients..];
             for (entry, &(_, source)) in gradients.iter_mut().zip(&self.gradients[j]) {

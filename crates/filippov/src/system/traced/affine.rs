@@ -32,7 +32,7 @@ impl AffineSigns for TracedSystem {
             stretched[j] *= ratio;
         }
         let place = place.with_signs(&stretched);
-        self.with_values(place.q, |p| compiled.fill(&place, p, parts));
+        self.with_values(place.q, |p| compiled.fill_anew(&place, p, parts));
         parts.stretch(&ratios);
         Ok(1)
     }
