@@ -21,6 +21,8 @@
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
+use std::borrow::Cow;
+
 use super::shared_load::{idle, largest, uniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
@@ -140,40 +142,34 @@ struct State {
 /// The pivots of one problem.
 struct Pivots<'a> {
     /// The problem without the effects of idle surfaces, which are rounding.
-    problem: RelayProblem,
+    problem: Cow<'a, RelayProblem>,
     /// The signs of these surfaces have no effect, for instance those of kinks. Each sign follows the rate of its surface.
     is_idle: Vec<bool>,
     uniqueness: Uniqueness,
     /// nu, and N where it is damped, with d.
     nu: Vec<f64>,
     damped: Option<SparseRows>,
-    /// No sign has an effect on the rate of another surface.
-    is_diagonal: bool,
     solver: SparseSolver,
     n_pivots: usize,
     patience: Patience<'a>,
 }
 
 impl<'a> Pivots<'a> {
-    fn new(problem: &RelayProblem, patience: Patience<'a>) -> Self {
+    fn new(problem: &'a RelayProblem, patience: Patience<'a>) -> Self {
         let m = problem.nu.len();
         let ones = vec![1.0; m];
         let is_idle = idle(&problem.n, |i| problem.rounding(&ones, i));
-        let acts: Vec<f64> = is_idle
-            .iter()
-            .map(|&is_idle| f64::from(u8::from(!is_idle)))
-            .collect();
-        let problem = RelayProblem {
-            nu: problem.nu.clone(),
-            n: problem.n.with_columns_scaled(&acts),
-            noise: problem.noise,
-        };
+        let mut problem = Cow::Borrowed(problem);
+        if is_idle.contains(&true) {
+            let acts = is_idle.iter().map(|is_idle| f64::from(u8::from(!is_idle)));
+            let acts: Vec<f64> = acts.collect();
+            problem.to_mut().n = problem.n.with_columns_scaled(&acts);
+        }
         let acting: Vec<usize> = (0..m).filter(|&i| !is_idle[i]).collect();
         let uniqueness = uniqueness(&problem.n.principal(&acting));
         Pivots {
             nu: problem.nu.clone(),
             damped: None,
-            is_diagonal: problem.n.is_diagonal(),
             problem,
             is_idle,
             uniqueness,
@@ -295,19 +291,9 @@ impl<'a> Pivots<'a> {
             .map(|&i| -self.nu[i] - self.n().dot(i, &signs))
             .collect();
         self.n_pivots += 1;
-        if self.is_diagonal {
-            for (&i, sign) in sliding.iter().zip(&mut unknown) {
-                let own = self.n().diagonal(i);
-                if own == 0.0 {
-                    return Err(Singular { unknowns: vec![i] });
-                }
-                *sign /= own;
-            }
-        } else {
-            let equations = self.n().principal(&sliding);
-            self.solver.factor(&equations)?;
-            self.solver.solve(&mut unknown);
-        }
+        let equations = self.n().principal(&sliding);
+        self.solver.factor(&equations)?;
+        self.solver.solve(&mut unknown);
         for (&i, &sign) in sliding.iter().zip(&unknown) {
             signs[i] = sign;
         }

@@ -154,6 +154,9 @@ pub enum Uniqueness {
 /// What N says of the solutions for every nu: one if -N is a P-matrix, one motion if it is so in some components, and becomes
 /// symmetric and semidefinite by a scaling of the columns in the others.
 pub(super) fn uniqueness(normal: &SparseRows) -> Uniqueness {
+    if normal.is_diagonal() && (0..normal.n_rows()).all(|i| normal.diagonal(i) < 0.0) {
+        return Uniqueness::Certain;
+    }
     let is_p = |block: &SparseRows| is_p_matrix(&negative(block)) == Some(true);
     if is_p(normal) {
         return Uniqueness::Certain;

@@ -146,12 +146,12 @@ impl MotionSeries {
 }
 
 /// What a rule knows of the motion that follows.
-#[derive(Clone, Copy, Default)]
+#[derive(Default)]
 pub(crate) struct Found<'f> {
     /// Its multipliers; none if they are not known.
     pub multipliers: &'f [f64],
     /// The fields around the point, evaluated there with its signs on all surfaces that are not among theirs.
-    pub parts: Option<&'f AffineParts>,
+    pub parts: Option<&'f mut AffineParts>,
 }
 
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
@@ -175,23 +175,23 @@ pub(crate) fn surfaces_left(
     // At the exit of a multiplier all forces may balance, and nothing of the motion itself tells how large they are.
     let mut around: Vec<usize> = leaving.iter().copied().chain(after.sliding_set()).collect();
     around.sort_unstable();
-    let known = found.parts.filter(|parts| parts.surfaces() == around);
-    let own = match known {
-        Some(_) => None,
-        None => parts_around(at, notes, &signs, &around)?,
-    };
-    let parts = known.or(own.as_ref());
-    // The strength of a contact that sticks is not that with which it slips.
-    let is_combination = multipliers.len() == after.codimension()
-        && at.slides_on_roots(after)
-        && !leaving.iter().any(|&j| at.system.sticks_at(j));
-    let velocity = match parts {
-        Some(parts) if is_combination => velocity_at(parts, &signs, multipliers),
-        _ => at.velocity(notes, after, multipliers)?,
-    };
-    let sizes = match parts {
+    let mut own;
+    let mut parts = found.parts.filter(|parts| parts.surfaces() == around);
+    if parts.is_none() {
+        own = parts_around(at, notes, &signs, &around)?;
+        parts = own.as_mut();
+    }
+    let sizes = match &parts {
         Some(parts) => sizes_of_rates(parts),
         None => component_sizes(at, notes, after, &around)?,
+    };
+    // The strength of a contact that sticks is not that with which it slips.
+    let is_combined = at.slides_on_roots(after) && !leaving.iter().any(|&j| at.system.sticks_at(j));
+    let mut parts = parts.filter(|_| is_combined);
+    let known = parts.as_ref().and_then(|parts| velocity_in(parts, after));
+    let velocity = match known {
+        Some(velocity) => velocity,
+        None => at.velocity(notes, after, multipliers)?,
     };
     for j in leaving {
         let (value, size) = at.rate_of(j, &signs, &velocity)?;
@@ -206,7 +206,17 @@ pub(crate) fn surfaces_left(
             let dt = at.moment(notes, &signs, &velocity)?;
             let x = at.along(&velocity, dt);
             let later = at.moved(at.t + dt, &x);
-            let velocity = later.velocity(notes, after, multipliers)?;
+            let known = match &mut parts {
+                Some(parts) => {
+                    evaluate(&later, notes, parts, &signs)?;
+                    velocity_in(parts, after)
+                }
+                None => None,
+            };
+            let velocity = match known {
+                Some(velocity) => velocity,
+                None => later.velocity(notes, after, multipliers)?,
+            };
             let (then, _) = later.rate_of(j, &signs, &velocity)?;
             let (order, value) = (2, (then - value) / dt);
             Leading { order, value }
@@ -214,6 +224,25 @@ pub(crate) fn surfaces_left(
         left.push(Left::beside(j, leading));
     }
     Ok(left)
+}
+
+/// The velocity in a mode by the fields around the point; `None` if they do not determine it.
+fn velocity_in(parts: &AffineParts, mode: &Mode) -> Option<Vec<f64>> {
+    let velocity = parts.velocity_in(|j| mode.entries()[j])?;
+    velocity.iter().all(|v| v.is_finite()).then_some(velocity)
+}
+
+/// Evaluates the fields around the point where the other surfaces have these signs.
+pub(super) fn evaluate(
+    at: &Point,
+    notes: &mut Notes,
+    parts: &mut AffineParts,
+    signs: &[f64],
+) -> Result<(), FieldError> {
+    if let Some(affine) = at.system.affine_signs() {
+        notes.n_field_evaluations += parts.evaluate(affine, &at.place(signs))?;
+    }
+    Ok(())
 }
 
 /// The fields around these surfaces where the others have these signs; `None` if they are not affine in theirs.
@@ -224,24 +253,11 @@ fn parts_around(
     surfaces: &[usize],
 ) -> Result<Option<AffineParts>, FieldError> {
     let affine = at.system.affine_signs();
-    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
-    let Some((affine, mut parts)) = parts else {
-        return Ok(None);
-    };
-    notes.n_field_evaluations += parts.evaluate(affine, &at.place(signs))?;
-    Ok(Some(parts))
-}
-
-/// The velocity with these signs, and with these multipliers on the surfaces where they are 0.
-fn velocity_at(parts: &AffineParts, signs: &[f64], multipliers: &[f64]) -> Vec<f64> {
-    let mut multipliers = multipliers.iter();
-    let own = parts.surfaces().iter().map(|&j| match signs[j] {
-        0.0 => multipliers.next().copied().unwrap_or(f64::NAN),
-        sign => sign,
-    });
-    let mut velocity = vec![0.0; parts.field.len()];
-    parts.combine(&own.collect::<Values>(), &mut velocity);
-    velocity
+    let mut parts = affine.and_then(|affine| affine.affine_parts(surfaces));
+    if let Some(parts) = &mut parts {
+        evaluate(at, notes, parts, signs)?;
+    }
+    Ok(parts)
 }
 
 /// For each surface a bound of its rate in the fields around it.

@@ -2,7 +2,7 @@
 
 use super::choice::choose;
 use super::consistency::agreeing_with_own_signs;
-use super::germ::{surfaces_left, Found};
+use super::germ::{evaluate, surfaces_left, Found};
 use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
@@ -35,17 +35,20 @@ pub(super) fn decide_by_relay(
     if !is_event && surfaces.len() == 2 && !Parallels::of(at, surfaces, mode)?.are_any() {
         return Ok(None);
     }
-    let mut found = relay_at(at, notes, meeting, false)?;
+    let affine = at.system.affine_signs();
+    let Some(mut parts) = affine.and_then(|affine| affine.affine_parts(surfaces)) else {
+        return Ok(None);
+    };
+    let mut found = relay_at(at, notes, meeting, &mut parts, false)?;
     let is_open = |posed: &Posed| {
         let found = &posed.solution;
         !found.degenerate.is_empty() || !found.loops.is_empty()
     };
     let is_late = is_event && found.as_ref().is_some_and(is_open);
     if is_late {
-        found = relay_at(at, notes, meeting, true)?;
+        found = relay_at(at, notes, meeting, &mut parts, true)?;
     }
     let Some(Posed {
-        parts,
         solution: mut found,
         may_be_tangent,
     }) = found
@@ -84,10 +87,14 @@ pub(super) fn decide_by_relay(
     let signs = found.signs.iter().zip(&found.modes);
     let sliding = signs.filter(|(_, &mode)| mode == 0);
     let multipliers: Vec<f64> = sliding.map(|(&sign, _)| sign).collect();
-    let is_as_posed = !is_late && after == meeting.on_all(&Mode::new(found.modes.clone()));
+    // Where other signs have changed with it, the fields are others.
+    let is_as_posed = after == meeting.on_all(&Mode::new(found.modes.clone()));
+    if is_late && is_as_posed {
+        evaluate(at, notes, &mut parts, &mode.signs())?;
+    }
     let found = Found {
         multipliers: &multipliers,
-        parts: is_as_posed.then_some(&parts),
+        parts: is_as_posed.then_some(&mut parts),
     };
     let left = surfaces_left_or_caught(at, notes, &mut after, surfaces, found)?;
     Ok(Some(Ok(Next::new(after, left))))
@@ -137,26 +144,20 @@ fn let_go(at: &Point, mode: &Mode, meeting: &[usize], found: &mut RelaySolution)
 
 /// A relay problem that was solved.
 struct Posed {
-    /// The fields around the place.
-    parts: AffineParts,
     solution: RelaySolution,
     /// All fields around may be tangent to a surface: they cross it at a small part of their speed.
     may_be_tangent: bool,
 }
 
 /// The relay problem of a meeting at the point, or a moment later along the motion that ends. `None` if the field is not
-/// affine in the signs, or if no solution was found.
+/// affine in the signs, or if no solution was found. `parts` are evaluated there.
 fn relay_at(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
+    parts: &mut AffineParts,
     is_late: bool,
 ) -> Result<Option<Posed>, FieldError> {
-    let affine = at.system.affine_signs();
-    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(meeting.surfaces)?)));
-    let Some((affine, mut parts)) = parts else {
-        return Ok(None);
-    };
     let (mut t, mut x, signs) = (at.t, at.x.to_vec(), meeting.mode.signs());
     if is_late {
         let mut velocity = vec![0.0; x.len()];
@@ -165,7 +166,7 @@ fn relay_at(
         let dt = at.moment(notes, &signs, &velocity)?;
         (t, x) = (t + dt, at.moved(t, &x).along(&velocity, dt));
     }
-    notes.n_field_evaluations += parts.evaluate(affine, &at.place_at(t, &x, &signs))?;
+    evaluate(&at.moved(t, &x), notes, parts, &signs)?;
     let entries = meeting.mode.entries();
     let before: Vec<i8> = meeting.surfaces.iter().map(|&j| entries[j]).collect();
     let (gradients, noise) = (&parts.gradients, at.system.lie_tolerance(1));
@@ -187,7 +188,6 @@ fn relay_at(
         size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
     });
     Ok(Some(Posed {
-        parts,
         solution,
         may_be_tangent,
     }))

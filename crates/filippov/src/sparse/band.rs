@@ -100,13 +100,6 @@ impl BandLu {
         self.n_operations += self.n * (2 * self.b + 1);
     }
 
-    /// Solves the equation of one unknown of a diagonal matrix.
-    #[inline]
-    pub fn solve_one(&mut self, k: usize, value: f64) -> f64 {
-        self.n_operations += 1;
-        value / self.entries[k]
-    }
-
     /// Solves with the first n rows and columns of U.
     fn back_substitute(&self, x: &mut [f64], n: usize) {
         for k in (0..n).rev() {

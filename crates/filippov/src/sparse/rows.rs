@@ -22,7 +22,7 @@ impl SparseRows {
     }
 
     /// The same with room for so many rows and entries.
-    fn with_capacity(n_columns: usize, (rows, entries): (usize, usize)) -> Self {
+    pub(crate) fn with_capacity(n_columns: usize, (rows, entries): (usize, usize)) -> Self {
         let mut starts = Vec::with_capacity(rows + 1);
         starts.push(0);
         SparseRows {

@@ -51,6 +51,8 @@ struct Block {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct SparseSolver {
+    /// The entries of a diagonal matrix, which needs nothing else.
+    diagonal: Option<Vec<f64>>,
     /// The pattern that the blocks belong to: columns of each row, row lengths in front.
     ordered: Vec<usize>,
     blocks: Vec<Block>,
@@ -80,6 +82,11 @@ impl SparseSolver {
         }
     }
 
+    /// A new solver for matrices with entries of the same errors.
+    pub fn of_this_noise(&self) -> Self {
+        SparseSolver::with_noise(self.noise)
+    }
+
     /// A solver that goes on at every pivot but zero: for matrices that have an inverse, however far apart the sizes
     /// are that they are made of, as 1/dt and the fastest rate of a stiff field.
     pub fn for_all_pivots() -> Self {
@@ -97,6 +104,10 @@ impl SparseSolver {
     /// # Errors
     /// [`Singular`] if a pivot is at the level of rounding.
     pub fn factor(&mut self, matrix: &SparseRows) -> Result<(), Singular> {
+        if matrix.is_diagonal() {
+            return self.factor_diagonal(matrix);
+        }
+        self.diagonal = None;
         self.order(matrix);
         self.scale(matrix);
         for (block, factor) in self.blocks.iter().zip(&mut self.factors) {
@@ -123,17 +134,26 @@ impl SparseSolver {
         Ok(())
     }
 
+    /// A diagonal matrix is singular where an entry is 0.
+    fn factor_diagonal(&mut self, matrix: &SparseRows) -> Result<(), Singular> {
+        let mut diagonal = self.diagonal.take().unwrap_or_default();
+        diagonal.clear();
+        diagonal.extend((0..matrix.n_rows()).map(|i| matrix.diagonal(i)));
+        let zero = diagonal.iter().position(|&entry| entry == 0.0);
+        self.diagonal = Some(diagonal);
+        zero.map_or(Ok(()), |i| Err(Singular { unknowns: vec![i] }))
+    }
+
     /// Solves in place with the matrix factored last.
     pub fn solve(&mut self, x: &mut [f64]) {
+        if let Some(diagonal) = &self.diagonal {
+            let pairs = x.iter_mut().zip(diagonal);
+            pairs.for_each(|(x, entry)| *x /= entry);
+            self.n_operations_before += x.len();
+            return;
+        }
         for (block, factor) in self.blocks.iter().zip(&mut self.factors) {
             let component = &block.joined;
-            if component.bandwidth == 0 {
-                for (place, &i) in component.unknowns.iter().enumerate() {
-                    let value = factor.solve_one(place, x[i] / self.row_scale[i]);
-                    x[i] = value / self.column_scale[i];
-                }
-                continue;
-            }
             self.buffer.clear();
             let scaled = component.unknowns.iter().map(|&i| x[i] / self.row_scale[i]);
             self.buffer.extend(scaled);
@@ -146,6 +166,9 @@ impl SparseSolver {
 
     /// What couples the unknowns of the matrix factored last.
     pub fn pattern(&self) -> Pattern {
+        if self.diagonal.is_some() {
+            return Pattern::Diagonal;
+        }
         let n: usize = self.place.len();
         let bandwidth = self.blocks.iter().map(|block| block.joined.bandwidth).max();
         match bandwidth {
@@ -174,16 +197,7 @@ impl SparseSolver {
             return;
         }
         self.ordered = key.collect();
-        self.blocks = match matrix.is_diagonal() {
-            true => vec![Block {
-                joined: Component {
-                    unknowns: (0..n).collect(),
-                    bandwidth: 0,
-                },
-                largest: 1,
-            }],
-            false => blocks(components(matrix)),
-        };
+        self.blocks = blocks(components(matrix));
         self.n_operations_before = self.n_operations();
         self.factors = vec![BandLu::default(); self.blocks.len()];
         self.place = vec![0; n];

@@ -298,6 +298,29 @@ impl AffineParts {
         Ok(())
     }
 
+    /// The velocity of a motion that slides on those of the surfaces whose entry is 0, and has left the others to these
+    /// sides, at the point of the evaluation. `None` where its multipliers are not determined.
+    pub fn velocity_in(&self, entries: impl Fn(usize) -> i8) -> Option<Vec<f64>> {
+        let mut signs: Vec<f64> = self.surfaces.iter().map(|&j| entries(j).into()).collect();
+        let rows = 0..signs.len();
+        let slid: Vec<usize> = rows.filter(|&row| signs[row] == 0.0).collect();
+        let normal = &self.normal.matrix;
+        let rate = |row: usize| {
+            let changes = normal.row(row).map(|(k, n)| n * (signs[k] - self.signs[k]));
+            self.rates[row] + changes.sum::<f64>()
+        };
+        let mut multipliers: Vec<f64> = slid.iter().map(|&row| -rate(row)).collect();
+        let mut solver = self.solver.of_this_noise();
+        solver.factor(&normal.principal(&slid)).ok()?;
+        solver.solve(&mut multipliers);
+        for (&row, multiplier) in slid.iter().zip(multipliers) {
+            signs[row] = multiplier;
+        }
+        let mut velocity = vec![0.0; self.field.len()];
+        self.combine(&signs, &mut velocity);
+        Some(velocity)
+    }
+
     /// The multipliers that [`AffineParts::slide`] found, one per surface.
     pub fn multipliers(&self) -> &[f64] {
         &self.multipliers

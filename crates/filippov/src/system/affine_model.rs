@@ -140,7 +140,8 @@ impl AffineModel {
             return None;
         }
         let matrix = |rows: &[Row]| {
-            let mut matrix = SparseRows::new(self.n_states);
+            let n_entries = surfaces.iter().map(|&j| rows[j].len()).sum();
+            let mut matrix = SparseRows::with_capacity(self.n_states, (surfaces.len(), n_entries));
             for &j in surfaces {
                 let pattern = rows[j].iter();
                 matrix.push_row(pattern.map(|&(state, value)| match value {
