@@ -9,8 +9,8 @@ use crate::graph::Graph;
 use crate::interval::Interval;
 use crate::node::NodeId;
 use crate::op::{BinaryOp, UnaryOp};
-use crate::schedule::Schedule;
-use crate::tape::{Number, Tape};
+use crate::schedule::{Lengths, Schedule};
+use crate::tape::{Arguments, Number, Tape};
 
 /// Bounds of a moving value and of its rate of change.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,9 +55,19 @@ pub trait Motion {
 #[derive(Debug, Clone)]
 pub struct EnclosureProgram {
     tape: Tape,
+    settled: Option<SettledValues>,
     n_signs: usize,
     n_parameters: usize,
     n_outputs: usize,
+}
+
+/// What follows from signs and parameters alone: numbers that the program reads as parameters.
+#[derive(Debug, Clone)]
+struct SettledValues {
+    tape: Tape,
+    count: usize,
+    /// The parameters in front of them.
+    n_parameters: usize,
 }
 
 impl EnclosureProgram {
@@ -66,11 +76,25 @@ impl EnclosureProgram {
     /// # Errors
     /// [`ExprError::UnknownNode`], [`ExprError::IndexTooLarge`].
     pub fn compile(graph: &Graph, outputs: &[NodeId]) -> Result<Self, ExprError> {
-        let schedule = Schedule::new(graph, outputs)?;
+        let Lengths {
+            signs, parameters, ..
+        } = Schedule::new(graph, outputs)?.lengths;
+        let (tape, settled) = match graph.settled(outputs)? {
+            None => (tape(graph, outputs)?, None),
+            Some(found) => {
+                let values = SettledValues {
+                    tape: tape(graph, &found.values)?,
+                    count: found.values.len(),
+                    n_parameters: found.n_parameters,
+                };
+                (tape(&found.graph, &found.outputs)?, Some(values))
+            }
+        };
         Ok(EnclosureProgram {
-            tape: Tape::new(graph, &schedule),
-            n_signs: schedule.lengths.signs,
-            n_parameters: schedule.lengths.parameters,
+            tape,
+            settled,
+            n_signs: signs,
+            n_parameters: parameters,
             n_outputs: outputs.len(),
         })
     }
@@ -84,8 +108,32 @@ impl EnclosureProgram {
             out.fill(Enclosure::UNKNOWN);
             return;
         }
-        self.tape.enclose(motion, s, p, out);
+        match &self.settled {
+            Some(values) => self.tape.enclose(motion, s, &values.behind(s, p), out),
+            None => self.tape.enclose(motion, s, p, out),
+        }
     }
+}
+
+impl SettledValues {
+    /// The parameters with the values behind them.
+    fn behind(&self, s: &[f64], p: &[f64]) -> Vec<f64> {
+        let mut all = p[..self.n_parameters].to_vec();
+        all.resize(self.n_parameters + self.count, 0.0);
+        let arguments = Arguments {
+            t: f64::NAN,
+            x: &[],
+            s,
+            p,
+            v: &[],
+        };
+        self.tape.run(arguments, &mut all[self.n_parameters..]);
+        all
+    }
+}
+
+fn tape(graph: &Graph, outputs: &[NodeId]) -> Result<Tape, ExprError> {
+    Ok(Tape::new(graph, &Schedule::new(graph, outputs)?))
 }
 
 impl Enclosure {

@@ -127,6 +127,6 @@ pub use switch::{Kind, Switch};
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Enclosures, Law, LawAction,
     LawMap, Laws, LieDerivatives, LieValue, Linearisation, Linearisations, MotionJacobian,
-    MotionJets, PiecewiseSystem, Place, RatePartials, Rules, Setting, SignStructure,
+    MotionJets, PiecewiseSystem, Place, RatePartials, RegionFields, Rules, Setting, SignStructure,
     SingularSliding, Step, TaylorSeries, TracedMap, TracedSystem, Word,
 };

@@ -2,13 +2,17 @@
 
 use super::{Motion, SmoothField};
 use crate::error::FieldError;
-use crate::system::{move_inside, side_offsets, OwnSetting, PiecewiseSystem, Setting};
+use crate::system::{
+    move_inside, side_offsets, OwnSetting, PiecewiseSystem, RegionFields, Setting,
+};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 #[derive(Clone)]
 pub struct RegionField<'a> {
     system: &'a dyn PiecewiseSystem,
     setting: OwnSetting,
+    /// The system as one of whose field the signs alone make much, and what they make of it.
+    settled: Option<(&'a dyn RegionFields, Vec<f64>)>,
     n_evaluations: u64,
     departing: bool,
 }
@@ -16,17 +20,27 @@ pub struct RegionField<'a> {
 impl<'a> RegionField<'a> {
     /// The field of the region with these signs, at these discrete states.
     pub fn new(system: &'a dyn PiecewiseSystem, setting: Setting<'_>) -> Self {
-        RegionField {
+        let mut field = RegionField {
             system,
             setting: OwnSetting::new(setting),
+            settled: system.region_fields().map(|fields| (fields, Vec::new())),
             n_evaluations: 0,
             departing: false,
+        };
+        field.settle();
+        field
+    }
+
+    fn settle(&mut self) {
+        if let Some((fields, values)) = &mut self.settled {
+            fields.settle(self.setting.get(), values);
         }
     }
 
     /// Starts anew in another region.
     pub fn restart(&mut self, setting: Setting<'_>) {
         self.setting.set(setting);
+        self.settle();
         self.n_evaluations = 0;
         self.departing = false;
     }
@@ -34,6 +48,7 @@ impl<'a> RegionField<'a> {
     /// Takes over the discrete states that an action left.
     pub(super) fn set_discrete(&mut self, q: &[f64]) {
         self.setting.set_discrete(q);
+        self.settle();
     }
 
     /// While the motion departs tangentially from a surface, stages may lie beyond it however short
@@ -62,7 +77,11 @@ impl SmoothField for RegionField<'_> {
     #[inline(always)]
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.n_evaluations += 1;
-        self.system.field(&self.setting.at(t, x), dx)?;
+        let place = self.setting.at(t, x);
+        match &self.settled {
+            None => self.system.field(&place, dx)?,
+            Some((fields, values)) => fields.eval(&place, values, dx),
+        }
         if self.departing && dx.iter().any(|v| !v.is_finite()) {
             self.eval_inside(t, x, dx)?;
         }

@@ -15,6 +15,7 @@ use super::both_sides::stretched;
 use super::jacobian::MotionJacobian;
 use super::jets::MotionJets;
 use super::reduction::{reduced, relative_degree};
+use super::region_fields::RegionProgram;
 use super::tiered::{compile, Tiered, TieredProgram};
 use super::Word;
 
@@ -32,6 +33,8 @@ pub(super) struct Model {
     pub names: Names,
     backend: Backend,
     pub field_program: TieredProgram,
+    /// The field in one region, where signs and parameters alone make much of it.
+    region_program: OnceLock<Option<RegionProgram>>,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
     single_rates: Vec<OnceLock<TieredProgram>>,
@@ -189,6 +192,7 @@ impl Model {
             jumps: Mutex::default(),
             relative_degrees: surfaces.iter().map(|_| OnceLock::new()).collect(),
             reductions: Mutex::default(),
+            region_program: OnceLock::new(),
             rates_program: OnceLock::new(),
             single_rates: surfaces.iter().map(|_| OnceLock::new()).collect(),
             affine_signs: OnceLock::new(),
@@ -306,6 +310,15 @@ impl Model {
             TieredProgram::new(graph, outputs, self.backend)
         });
         made.program()
+    }
+
+    /// The field in one region, where signs and parameters alone make much of it.
+    #[inline]
+    pub fn region_program(&self) -> Option<&RegionProgram> {
+        let made = self
+            .region_program
+            .get_or_init(|| RegionProgram::new(&self.graph, &self.field, self.backend));
+        made.as_ref()
     }
 
     /// h_j, then their rates along the input vector.

@@ -31,6 +31,7 @@ mod map;
 mod place;
 mod readers;
 mod reduction;
+mod region_fields;
 mod sign_structure;
 mod taylor_series;
 mod tiered;
@@ -59,6 +60,7 @@ pub(crate) use map::sides_of;
 pub use map::TracedMap;
 pub(crate) use place::OwnSetting;
 pub use place::{Place, Setting};
+pub use region_fields::RegionFields;
 pub use sign_structure::SignStructure;
 pub use taylor_series::TaylorSeries;
 pub(crate) use tiered::Tiered;
@@ -81,7 +83,7 @@ use crate::tolerances::EPS;
 ///    [`Place`].
 ///
 /// What is known of its signs is its [`SignStructure`]: asked too often for a detour. Everything else is a capability, which a
-/// system may have: [`AffineSigns`], [`LieDerivatives`], [`TaylorSeries`], [`Enclosures`], [`Linearisations`]. The methods of
+/// system may have: [`AffineSigns`], [`LieDerivatives`], [`TaylorSeries`], [`RegionFields`], [`Enclosures`], [`Linearisations`]. The methods of
 /// `dyn PiecewiseSystem` ask for it, with an answer that is always right where it is absent.
 pub trait PiecewiseSystem: SignStructure + Sync {
     /// Number of states.
@@ -235,6 +237,11 @@ pub trait PiecewiseSystem: SignStructure + Sync {
 
     /// Its Taylor series, if there are any.
     fn taylor_series(&self) -> Option<&dyn TaylorSeries> {
+        None
+    }
+
+    /// Its fields of regions, where the signs alone make much of them.
+    fn region_fields(&self) -> Option<&dyn RegionFields> {
         None
     }
 

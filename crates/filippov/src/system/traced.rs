@@ -16,7 +16,8 @@ use super::jet_multipliers::MultiplierEquations;
 use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
-    MotionJets, PiecewiseSystem, Place, RatePartials, Setting, SignStructure, TaylorSeries, Word,
+    MotionJets, PiecewiseSystem, Place, RatePartials, RegionFields, Setting, SignStructure,
+    TaylorSeries, Word,
 };
 use crate::error::FieldError;
 use crate::system::Linearisation;
@@ -424,6 +425,10 @@ impl PiecewiseSystem for TracedSystem {
         Some(self)
     }
 
+    fn region_fields(&self) -> Option<&dyn RegionFields> {
+        self.model.region_program().map(|_| self as _)
+    }
+
     fn enclosures(&self) -> Option<&dyn Enclosures> {
         Some(self)
     }
@@ -603,6 +608,21 @@ impl Enclosures for TracedSystem {
         let signs = setting.signs;
         self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
         Some(out)
+    }
+}
+
+impl RegionFields for TracedSystem {
+    fn settle(&self, setting: Setting<'_>, values: &mut Vec<f64>) {
+        if let Some(region) = self.model.region_program() {
+            self.with_values(setting.q, |p| region.settle(setting.signs, p, values));
+        }
+    }
+
+    #[inline]
+    fn eval(&self, place: &Place<'_>, values: &[f64], dx: &mut [f64]) {
+        if let Some(region) = self.model.region_program() {
+            region.eval(place, values, dx);
+        }
     }
 }
 
