@@ -1,5 +1,7 @@
 //! The motion over a piece of a step, enclosed.
 
+use std::cell::RefCell;
+
 use filippov_expr::{Enclosure, Interval, Motion};
 
 use crate::stepper::Interpolant;
@@ -67,5 +69,32 @@ impl Motion for Tube<'_> {
             )
             .scaled(1.0 / dt),
         }
+    }
+}
+
+/// A tube that many functions ask for the same states.
+pub struct RememberedTube<'t> {
+    tube: &'t Tube<'t>,
+    states: RefCell<Vec<Option<Enclosure>>>,
+}
+
+impl<'t> RememberedTube<'t> {
+    /// The tube of a motion of `n` states.
+    pub fn new(tube: &'t Tube<'t>, n: usize) -> Self {
+        RememberedTube {
+            tube,
+            states: RefCell::new(vec![None; n]),
+        }
+    }
+}
+
+impl Motion for RememberedTube<'_> {
+    fn time(&self) -> Interval {
+        self.tube.time()
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        let known = &mut self.states.borrow_mut()[index];
+        *known.get_or_insert_with(|| self.tube.state(index))
     }
 }

@@ -242,7 +242,7 @@ impl<'a> AffineLaw<'a> {
                     entries.map(|(i, g)| g * (x[i] - start[i])).sum::<f64>()
                 });
                 let h = self.h[j] + moved;
-                if h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
+                if h == 0.0 || h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
                     continue;
                 }
                 let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();

@@ -295,6 +295,15 @@ impl AffineParts {
             *lambda += here;
         }
         self.combine(&self.multipliers, dx);
+        // A state that is held by its surface alone does not move by the rounding of these sums.
+        for (row, rate) in self.time_rates.iter().enumerate() {
+            let mut entries = self.gradients.row(row);
+            if let (Some((i, slope)), None) = (entries.next(), entries.next()) {
+                if slope != 0.0 && dx[i].is_finite() {
+                    dx[i] = 0.0 - rate / slope;
+                }
+            }
+        }
         Ok(())
     }
 

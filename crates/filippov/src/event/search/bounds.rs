@@ -7,13 +7,13 @@ use smallvec::SmallVec;
 
 use crate::cube::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
 use crate::event::certificate::Bound;
-use crate::event::tube::Tube;
+use crate::event::tube::{RememberedTube, Tube};
 use crate::mode::Signs;
 use crate::motion::Monitored;
 use crate::motion::{AffineBounds, Guard, RootEnd, Seen};
 use crate::stepper::Interpolant;
 use crate::system::{PiecewiseSystem, Setting};
-use crate::tolerances::{MOST_ENCLOSED, ROOT_BOXES};
+use crate::tolerances::{EPS, MOST_ENCLOSED, ROOT_BOXES};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(crate) struct BoundedCurve<'a> {
@@ -137,6 +137,7 @@ impl BoundedCurve<'_> {
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.sliding_system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
+            let tube = RememberedTube::new(&tube, self.interpolant.n_states());
             let exits = self.seen.chunks_exact(2).take(self.sliding.len());
             let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
@@ -168,6 +169,26 @@ impl BoundedCurve<'_> {
             }
         }
         Some(found)
+    }
+}
+
+/// Do bounds of the multipliers that another guard has asked for show that one has no zero up to `reach`?
+pub(crate) fn is_known_clear(m: &Monitored, known: &[RootPiece], reach: f64) -> bool {
+    let (Guard::Multiplier { end, .. }, Some((a, b, bounds))) = (m.guard, known.first()) else {
+        return false;
+    };
+    let (is_piece, position) = ((*a, *b) == (0.0, reach), m.place / 2);
+    match bounds {
+        RootBounds::Proved(root) if is_piece && position < root.multipliers.len() => {
+            let multiplier = root.multipliers[position];
+            let nearest = if end > 0 {
+                multiplier.hi
+            } else {
+                -multiplier.lo
+            };
+            1.0 - nearest > m.noise + EPS
+        }
+        _ => false,
     }
 }
 

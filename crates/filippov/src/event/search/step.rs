@@ -3,7 +3,7 @@
 use filippov_expr::Motion;
 use smallvec::{smallvec, SmallVec};
 
-use super::bounds::BoundedCurve;
+use super::bounds::{is_known_clear, BoundedCurve};
 use super::detector::Detector;
 use super::detector::CLEAR_OF_NOISE;
 use super::sought::{AtZero, Search, Sought};
@@ -307,6 +307,9 @@ impl StepSearch<'_, '_> {
     /// What bounds over the step up to `reach` prove about a function.
     pub(crate) fn prove_clear(&self, index: usize, value_at_end: f64, reach: f64) -> Proof {
         let m = self.run.motion.monitored[index];
+        if value_at_end > 0.0 && is_known_clear(&m, &self.detector.enclosed_roots.borrow(), reach) {
+            return Proof::Clear;
+        }
         let curve = BoundedCurve {
             system: self.run.system,
             sliding_system: self.run.motion.sliding_system(self.run.system),
