@@ -52,15 +52,11 @@ fn decide_block(block: &SparseRows) -> Option<bool> {
     Some(has_positive_minors(&dense))
 }
 
-/// Does the comparison matrix (|a_ii| on the diagonal, -|a_ij| beside it) map some positive vector to a positive
+/// Does the comparison matrix map some positive vector to a positive
 /// vector? Then it is an M-matrix.
 fn is_h_matrix(block: &SparseRows) -> bool {
     let m = block.n_rows();
-    let mut comparison = SparseRows::new(m);
-    for i in 0..m {
-        let entries = block.row(i);
-        comparison.push_row(entries.map(|(j, v)| (j, if i == j { v.abs() } else { -v.abs() })));
-    }
+    let comparison = block.comparison();
     let mut solver = SparseSolver::default();
     if solver.factor(&comparison).is_err() {
         return false;

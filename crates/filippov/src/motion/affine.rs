@@ -46,7 +46,7 @@ impl<'a> AffineLaw<'a> {
         let parts = affine.affine_parts(set)?;
         Some(AffineLaw {
             system: affine,
-            is_orthogonal: has_disjoint_rows(&parts.gradients),
+            is_orthogonal: parts.gradients.has_disjoint_rows(),
             parts,
             known_ends: None,
             setting,
@@ -258,12 +258,4 @@ impl<'a> AffineLaw<'a> {
         }
         Ok(())
     }
-}
-
-fn has_disjoint_rows(matrix: &SparseRows) -> bool {
-    let mut columns: Vec<usize> = (0..matrix.n_rows())
-        .flat_map(|row| matrix.columns(row).to_vec())
-        .collect();
-    columns.sort_unstable();
-    columns.windows(2).all(|pair| pair[0] != pair[1])
 }

@@ -40,7 +40,7 @@ impl AffineBounds {
     pub fn new(matrix: &SparseRows) -> Option<Self> {
         let (mut normal, mut comparison) = (SparseSolver::default(), SparseSolver::default());
         normal.factor(matrix).ok()?;
-        comparison.factor(&comparison_of(matrix)).ok()?;
+        comparison.factor(&matrix.comparison()).ok()?;
         let mut positive = vec![1.0; matrix.n_rows()];
         comparison.solve(&mut positive);
         // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
@@ -96,15 +96,6 @@ impl AffineBounds {
             |(m, r): (&f64, &f64)| Interval::around(-m, r.abs() * (1.0 + 1e-10) + rounding);
         Some(pairs.map(around).collect())
     }
-}
-
-fn comparison_of(matrix: &SparseRows) -> SparseRows {
-    let mut comparison = SparseRows::new(matrix.n_columns());
-    for i in 0..matrix.n_rows() {
-        let entries = matrix.row(i);
-        comparison.push_row(entries.map(|(j, v)| (j, if i == j { v.abs() } else { -v.abs() })));
-    }
-    comparison
 }
 
 #[cfg(test)]

@@ -169,6 +169,12 @@ impl SparseRows {
         }
         let n_entries = kept.iter().map(|&i| self.columns(i).len()).sum();
         let mut block = SparseRows::with_capacity(kept.len(), (kept.len(), n_entries));
+        if self.is_diagonal() {
+            for (place, &i) in kept.iter().enumerate() {
+                block.push_row(self.row(i).map(|(_, value)| (place, value)));
+            }
+            return block;
+        }
         for &i in kept {
             let place = |(j, value)| kept.binary_search(&j).ok().map(|place| (place, value));
             block.push_row(self.row(i).filter_map(place));
@@ -183,6 +189,29 @@ impl SparseRows {
         let entries = scaled.values.iter_mut().zip(&self.columns);
         entries.for_each(|(value, &j)| *value *= factors[j]);
         scaled
+    }
+
+    /// The comparison matrix of a square one: |a_ii| on the diagonal, -|a_ij| beside it.
+    #[must_use]
+    pub fn comparison(&self) -> SparseRows {
+        let mut comparison = self.clone();
+        for i in 0..self.n_rows() {
+            for k in self.starts[i]..self.starts[i + 1] {
+                let size = self.values[k].abs();
+                comparison.values[k] = if self.columns[k] == i { size } else { -size };
+            }
+        }
+        comparison
+    }
+
+    /// Have no two rows a column in common?
+    pub fn has_disjoint_rows(&self) -> bool {
+        let is_disjoint = |columns: &[usize]| columns.windows(2).all(|pair| pair[0] < pair[1]);
+        is_disjoint(&self.columns) || {
+            let mut columns = self.columns.clone();
+            columns.sort_unstable();
+            is_disjoint(&columns)
+        }
     }
 
     /// A square matrix less a diagonal.
