@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use filippov_expr::{Enclosure, Interval, Motion};
+use smallvec::SmallVec;
 
 use crate::stepper::Interpolant;
 use crate::tolerances::{EPS, PROBED};
@@ -75,7 +76,7 @@ impl Motion for Tube<'_> {
 /// A tube that many functions ask for the same states.
 pub struct RememberedTube<'t> {
     tube: &'t Tube<'t>,
-    states: RefCell<Vec<Option<Enclosure>>>,
+    states: RefCell<SmallVec<[Option<Enclosure>; 8]>>,
 }
 
 impl<'t> RememberedTube<'t> {
@@ -83,7 +84,7 @@ impl<'t> RememberedTube<'t> {
     pub fn new(tube: &'t Tube<'t>, n: usize) -> Self {
         RememberedTube {
             tube,
-            states: RefCell::new(vec![None; n]),
+            states: RefCell::new(SmallVec::from_elem(None, n)),
         }
     }
 }
