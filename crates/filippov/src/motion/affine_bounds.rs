@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use filippov_expr::{Interval, Motion};
+use filippov_expr::{Enclosure, Interval, Motion};
 
 use crate::cube::{IntervalVector, Vector};
 use crate::mode::Signs;
@@ -23,6 +23,7 @@ use crate::system::{AffineSigns, Setting};
 /// (1937); A. Neumaier, *Interval Methods for Systems of Equations* (1990), section 3.7.
 #[derive(Clone)]
 pub struct AffineBounds {
+    matrix: SparseRows,
     normal: RefCell<SparseSolver>,
     comparison: RefCell<SparseSolver>,
 }
@@ -46,13 +47,14 @@ impl AffineBounds {
         // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
         let is_m_matrix = positive.iter().all(|v| v.is_finite() && *v > 0.0);
         is_m_matrix.then(|| AffineBounds {
+            matrix: matrix.clone(),
             normal: RefCell::new(normal),
             comparison: RefCell::new(comparison),
         })
     }
 
-    /// The multipliers along a piece of motion, from their values `near` it; `None` if a rate of a switching function has
-    /// no bounds.
+    /// The multipliers along a piece of motion, from their values `near` it, and those at its `start` if they are known: where nothing
+    /// moves that a rate reads, it is what it is there. `None` if a rate of a switching function has no bounds.
     pub fn enclose(
         &self,
         affine: &dyn AffineSigns,
@@ -60,14 +62,24 @@ impl AffineBounds {
         motion: &dyn Motion,
         setting: Setting<'_>,
         near: &[f64],
+        start: Option<&[f64]>,
     ) -> Option<EnclosedMultipliers> {
         let mut signs = Signs::from_slice(setting.signs);
         for (&j, &lambda) in set.iter().zip(near) {
             signs[j] = lambda;
         }
         let (mut values, mut rates) = (IntervalVector::new(), IntervalVector::new());
-        for &j in set {
-            let enclosure = affine.enclose_rate(j, motion, setting.with_signs(&signs))?;
+        for (row, &j) in set.iter().enumerate() {
+            let still = start.filter(|_| !affine.rate_moves(j, motion));
+            let enclosure = match still {
+                Some(start) => {
+                    // Sliding makes it zero with the multipliers at the start.
+                    let entries = self.matrix.row(row);
+                    let changes = entries.map(|(k, n)| n * (near[k] - start[k]));
+                    Enclosure::constant(changes.sum())
+                }
+                None => affine.enclose_rate(j, motion, setting.with_signs(&signs))?,
+            };
             values.push(enclosure.value);
             rates.push(enclosure.rate);
         }
@@ -180,7 +192,14 @@ mod tests {
             let near = multipliers(affine, 0.5 * (from + to));
             let motion = Straight(from, to);
             let found = bounds
-                .enclose(affine, &set, &motion, Setting::of_signs(&signs), &near)
+                .enclose(
+                    affine,
+                    &set,
+                    &motion,
+                    Setting::of_signs(&signs),
+                    &near,
+                    None,
+                )
                 .unwrap();
             for k in 0..=20 {
                 let t = from + (to - from) * f64::from(k) / 20.0;

@@ -92,6 +92,12 @@ pub trait AffineSigns: PiecewiseSystem {
         false
     }
 
+    /// May dh_j/dt change along a piece of motion? `false` if it reads nothing that moves.
+    fn rate_moves(&self, j: usize, motion: &dyn Motion) -> bool {
+        let _ = (j, motion);
+        true
+    }
+
     /// Rigorous bounds of dh_j/dt, and of its derivative, along a piece of motion; entries of `signs` may be any numbers on surfaces that
     /// [`affine_parts`](Self::affine_parts) accepts together. `None` if there are none.
     fn enclose_rate(

@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use filippov_expr::{
-    Backend, Enclosure, EnclosureProgram, Gradient, Graph, Motion, NodeId, SignDependence,
+    Backend, Enclosure, EnclosureProgram, Gradient, Graph, Motion, Node, NodeId, SignDependence,
 };
 
 use super::affine::AffineParts;
@@ -42,6 +42,8 @@ pub(super) struct AffineModel {
     /// dh_j/dt along the blended field, and bounds of it once they were asked for.
     rates: Vec<NodeId>,
     enclosing: Vec<OnceLock<Option<EnclosureProgram>>>,
+    /// The states that it contains, once they were asked for; `None` if it contains the time.
+    read_by_rate: Vec<OnceLock<Option<Vec<usize>>>>,
     /// Surfaces that may not be slid on together with this one: their signs multiply, or one is in the
     /// gradient of the other.
     conflicts: Vec<Vec<u32>>,
@@ -114,9 +116,10 @@ impl AffineModel {
             in_gradient,
             varies: varies.collect(),
             program: TieredProgram::new(graph.clone(), outputs, backend),
-            graph,
+            read_by_rate: rates.iter().map(|_| OnceLock::new()).collect(),
             enclosing: rates.iter().map(|_| OnceLock::new()).collect(),
             rates,
+            graph,
             is_steady,
             n_states: field.len(),
             time_rates,
@@ -194,6 +197,12 @@ impl AffineModel {
     /// motion?
     pub fn is_steady(&self, j: usize) -> bool {
         self.is_steady[j]
+    }
+
+    /// The states in dh_j/dt; `None` if it contains the time.
+    pub fn read_by_rate(&self, j: usize) -> Option<&[usize]> {
+        let read = || states_in(&self.graph, self.rates[j]);
+        self.read_by_rate[j].get_or_init(read).as_deref()
     }
 
     /// Bounds of dh_j/dt, and of its derivative, along a piece of motion.
@@ -303,6 +312,19 @@ fn jumps(
         }
     }
     jumps
+}
+
+/// The states that a value contains; `None` if it contains the time.
+fn states_in(graph: &Graph, value: NodeId) -> Option<Vec<usize>> {
+    let mut states = Vec::new();
+    for id in graph.all_below(&[value]) {
+        match *graph.node(id) {
+            Node::State(i) => states.push(i as usize),
+            Node::Time | Node::Input(_) => return None,
+            _ => {}
+        }
+    }
+    Some(states)
 }
 
 /// The surfaces whose signs these values contain.

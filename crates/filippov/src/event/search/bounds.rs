@@ -138,10 +138,15 @@ impl BoundedCurve<'_> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.sliding_system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
             let tube = RememberedTube::new(&tube, self.interpolant.n_states());
-            let exits = self.seen.chunks_exact(2).take(self.sliding.len());
-            let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
+            let exits = || self.seen.chunks_exact(2).take(self.sliding.len());
+            let middles = exits().map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
-            let found = bounds.enclose(affine, self.sliding, &tube, self.setting, &near);
+            // Exit functions with a slack, and those of shared loads, are not those of the multipliers alone.
+            let is_plain =
+                exits().all(|pair| (pair[0].start + pair[1].start - 2.0).abs() <= 8.0 * EPS);
+            let start: Vector = exits().map(|pair| pair[0].start - 1.0).collect();
+            let start = is_plain.then_some(&start[..]);
+            let found = bounds.enclose(affine, self.sliding, &tube, self.setting, &near, start);
             return Some(found.map_or(RootBounds::Unproved, |found| {
                 RootBounds::Proved(EnclosedRoot {
                     multipliers: found.values,

@@ -41,6 +41,14 @@ impl AffineSigns for TracedSystem {
         !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
     }
 
+    fn rate_moves(&self, j: usize, motion: &dyn Motion) -> bool {
+        let model = self.model.affine_signs();
+        model.read_by_rate(j).is_none_or(|states| {
+            let mut rates = states.iter().map(|&i| motion.state(i).rate);
+            rates.any(|rate| !rate.is_zero())
+        })
+    }
+
     fn enclose_rate(
         &self,
         j: usize,
