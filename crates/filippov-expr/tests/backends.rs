@@ -39,6 +39,38 @@ proptest! {
             prop_assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "output {k}: {a} {b}");
         }
     }
+
+    /// What signs and parameters alone make of the values is computed apart.
+    #[test]
+    fn settled_values_are_the_same_to_the_bit(
+        recipe in recipes(60),
+        x in prop::collection::vec(numbers(), 3),
+        p in prop::collection::vec(numbers(), 2),
+        signs in prop::collection::vec(prop_oneof![Just(1.0), Just(-1.0)], 100),
+    ) {
+        let (mut g, mut nodes) = build(&recipe);
+        let mut sum = g.parameter(1);
+        for k in 0..20_u32 {
+            let (sign, weight) = (g.sign_of(k % 7), g.constant(0.1 * f64::from(k + 1)));
+            let term = g.mul(sign, weight);
+            sum = g.add(sum, term);
+        }
+        let moving = g.mul(sum, nodes[nodes.len() - 1]);
+        nodes.extend([sum, moving]);
+        let run = |g: &Graph, nodes: &[NodeId], p: &[f64]| {
+            let mut out = vec![0.0; nodes.len()];
+            let program = Program::compile(g, nodes, Backend::Interpreter).unwrap();
+            program.eval(0.3, &x, &signs, p, &[0.7], &mut out);
+            out
+        };
+        let settled = g.settled(&nodes).unwrap().unwrap();
+        let mut known = p[..settled.n_parameters].to_vec();
+        known.extend(run(&g, &settled.values, &p));
+        let (a, b) = (run(&g, &nodes, &p), run(&settled.graph, &settled.outputs, &known));
+        for (k, (a, b)) in a.iter().zip(&b).enumerate() {
+            prop_assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "output {k}: {a} {b}");
+        }
+    }
 }
 
 #[test]

@@ -145,6 +145,50 @@ proptest! {
 }
 
 /// The bounds shrink with the piece: the value's excess in proportion, which is what the search relies on.
+/// Sums of many signs and parameters are numbers in the enclosures that read them.
+#[test]
+fn what_signs_make_of_a_value_is_enclosed() {
+    let mut g = Graph::new();
+    let mut sum = g.parameter(1);
+    for k in 0..20_u32 {
+        let (sign, weight) = (g.sign_of(k % 3), g.constant(0.1 * f64::from(k + 1)));
+        let term = g.mul(sign, weight);
+        sum = g.add(sum, term);
+    }
+    let (x, y) = (g.state(0), g.state(1));
+    let product = g.mul(sum, x);
+    let rate = g.add(product, y);
+    for pattern in 0..8 {
+        let sign = |bit: usize| if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let from = Point {
+            t: 0.0,
+            x: vec![0.4, -0.3, 0.0],
+            p: vec![0.0, 0.25],
+            signs: (0..3).map(sign).collect(),
+        };
+        let line = Line {
+            from: from.clone(),
+            direction: vec![1.0, 2.0, 0.0],
+            length: 0.1,
+        };
+        let program = EnclosureProgram::compile(&g, &[rate, sum]).unwrap();
+        let mut out = [Enclosure::UNKNOWN; 2];
+        program.eval(&line, &from.signs, &from.p, &mut out);
+        let mut own = 0.25;
+        for k in 0..20 {
+            own += from.signs[k % 3] * (0.1 * (k + 1) as f64);
+        }
+        assert_eq!(out[1], Enclosure::constant(own));
+        for share in [0.0, 0.5, 1.0] {
+            let at = line.at(share);
+            let value = own * at.x[0] + at.x[1];
+            assert!(out[0].value.lo <= value && value <= out[0].value.hi);
+        }
+        assert!(out[0].value.hi - out[0].value.lo < 0.1 * (own.abs() + 2.0) + 1e-12);
+        assert!((out[0].rate.lo - own - 2.0).abs() < 1e-12);
+    }
+}
+
 #[test]
 fn bounds_are_tight_for_short_pieces() {
     let mut g = Graph::new();

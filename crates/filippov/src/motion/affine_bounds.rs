@@ -220,4 +220,59 @@ mod tests {
             }
         }
     }
+
+    /// v_i' = x_i^2 - sign(v_i) - 0.3 sum of the other signs; x moves or not.
+    struct Still<'a>(&'a [f64]);
+
+    impl Motion for Still<'_> {
+        fn time(&self) -> Interval {
+            Interval::hull(0.0, 1.0)
+        }
+        fn state(&self, index: usize) -> Enclosure {
+            Enclosure::constant(self.0[index])
+        }
+    }
+
+    #[test]
+    fn a_rate_that_reads_nothing_that_moves_gives_the_multipliers_at_the_start() {
+        let mut g = Graph::new();
+        let share = g.constant(0.3);
+        let signs = [2, 3].map(|i| {
+            let v = g.state(i);
+            g.sign(v)
+        });
+        let zero = g.constant(0.0);
+        let mut field = vec![zero, zero];
+        for i in 0..2_usize {
+            let x = g.state(i as u32);
+            let (square, other) = (g.mul(x, x), g.mul(share, signs[1 - i]));
+            let held = g.sub(square, signs[i]);
+            field.push(g.sub(held, other));
+        }
+        let system =
+            TracedSystem::new(g, field, Vec::new(), Names::default(), Backend::Auto).unwrap();
+        let affine = system.affine_signs().unwrap();
+        let mut parts = affine.affine_parts(&[0, 1]).unwrap();
+        let x = [0.5, 0.8, 0.0, 0.0];
+        parts
+            .evaluate(affine, &Place::new(0.0, &x, &[0.0; 2]))
+            .unwrap();
+        parts.slide(&mut [0.0; 4]).unwrap();
+        let lambda = parts.multipliers();
+        let bounds = AffineBounds::new(parts.normal()).unwrap();
+        let signs = [1.0; 2];
+        let setting = Setting::of_signs(&signs);
+        let enclose = |start| {
+            let found = bounds.enclose(affine, &[0, 1], &Still(&x), setting, &[0.1, 0.2], start);
+            found.unwrap().values
+        };
+        assert!((0..2).all(|i| !affine.rate_moves(i, &Still(&x))));
+        for (known, computed) in enclose(Some(lambda)).iter().zip(enclose(None)) {
+            assert!((known.lo - computed.lo).abs() < 1e-11);
+            assert!((known.hi - computed.hi).abs() < 1e-11);
+        }
+        for (known, lambda) in enclose(Some(lambda)).iter().zip(lambda) {
+            assert!(known.lo <= *lambda && *lambda <= known.hi);
+        }
+    }
 }

@@ -450,3 +450,53 @@ impl SmoothField for IntersectionField<'_> {
         self.n_evaluations
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use filippov_expr::{Backend, Graph, Names};
+
+    use super::IntersectionField;
+    use crate::motion::{Motion, SmoothField};
+    use crate::system::{Setting, TracedSystem};
+
+    /// x_i' = x_i - s_i (2 + s_2 x_i^2) - 0.3 s_(other), i = 0, 1, and x_2' = 1.
+    fn system() -> TracedSystem {
+        let mut g = Graph::new();
+        let x = [0, 1, 2].map(|i| g.state(i));
+        let s = x.map(|x| g.sign(x));
+        let (two, share) = (g.constant(2.0), g.constant(0.3));
+        let mut field = Vec::new();
+        for i in 0..2 {
+            let square = g.mul(x[i], x[i]);
+            let bent = g.mul(s[2], square);
+            let strength = g.add(two, bent);
+            let (own, other) = (g.mul(s[i], strength), g.mul(share, s[1 - i]));
+            let rate = g.sub(x[i], own);
+            field.push(g.sub(rate, other));
+        }
+        field.push(g.constant(1.0));
+        TracedSystem::new(g, field, Vec::new(), Names::default(), Backend::Auto).unwrap()
+    }
+
+    #[test]
+    fn a_field_that_starts_anew_is_a_new_one() {
+        let (system, set) = (system(), [0, 1]);
+        let at = |field: &mut IntersectionField, x: [f64; 3]| {
+            let (mut x, mut dx) = (x, [0.0; 3]);
+            field.eval(0.2, &mut x, &mut dx).unwrap();
+            (dx, field.multipliers(), field.last_exits().to_vec())
+        };
+        let (before, after) = ([1.0, 1.0, -1.0], [1.0, 1.0, 1.0]);
+        let setting = Setting::of_signs(&after);
+        let mut used = IntersectionField::new(&system, &set, Setting::of_signs(&before), &[]);
+        at(&mut used, [0.1, -0.2, -1.0]);
+        assert!(used.restart(&set, setting));
+        let mut new = IntersectionField::new(&system, &set, setting, &[]);
+        for x in [[0.0, 0.0, 0.4], [1e-3, -1e-3, 2.0]] {
+            assert_eq!(at(&mut used, x), at(&mut new, x));
+        }
+        assert_eq!(used.n_evaluations(), new.n_evaluations());
+        assert!(!used.restart(&[0, 2], setting));
+    }
+}

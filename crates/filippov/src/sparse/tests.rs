@@ -115,6 +115,32 @@ fn the_ordering_is_kept_with_the_pattern_and_the_cost_is_linear() {
 }
 
 #[test]
+fn without_exchanges_a_band_is_eliminated_over_its_own_width() {
+    let (n, b) = (60, 7);
+    let operations = |diagonal: f64| {
+        let mut state = 3;
+        let mut matrix = SparseRows::new(n);
+        for i in 0..n {
+            let columns = i.saturating_sub(b)..(i + b + 1).min(n);
+            let mut entry = |j| {
+                if i == j {
+                    diagonal
+                } else {
+                    pseudo_random(&mut state)
+                }
+            };
+            matrix.push_row(columns.map(|j| (j, entry(j))).collect::<Vec<_>>());
+        }
+        assert!(residual(&matrix, &vec![1.0; n]) < 1e-10);
+        let mut solver = SparseSolver::default();
+        solver.factor(&matrix).expect("not singular");
+        solver.n_operations()
+    };
+    let (dominant, exchanged) = (operations(100.0), operations(0.01));
+    assert!(dominant <= n * b * (b + 1) && exchanged > n * b * (b + 1));
+}
+
+#[test]
 fn products_are_those_of_the_dense_rows() {
     let a = SparseRows::from_dense(&[vec![1.0, 0.0, 2.0], vec![0.0, 3.0, 0.0]]);
     let b = SparseRows::from_dense(&[vec![0.0, 0.0, 5.0], vec![7.0, 0.0, 1.0]]);

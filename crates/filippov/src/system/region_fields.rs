@@ -53,3 +53,53 @@ impl RegionProgram {
         program.eval(t, x, signs, values, &[], dx);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use filippov_expr::{Backend, Graph, Names};
+
+    use crate::system::{PiecewiseSystem, Setting, TracedSystem};
+
+    /// x' = (q + sum of p sign(x - k)) x, with as many levels.
+    fn levels(n: usize) -> TracedSystem {
+        let mut g = Graph::new();
+        let (x, p, mut rate) = (g.state(0), g.parameter(0), g.parameter(1));
+        for k in 0..n {
+            let level = g.constant(k as f64);
+            let h = g.sub(x, level);
+            let sign = g.sign(h);
+            let term = g.mul(p, sign);
+            rate = g.add(rate, term);
+        }
+        let field = vec![g.mul(rate, x)];
+        let system = TracedSystem::new(g, field, vec![0.3], Names::default(), Backend::Auto);
+        system.expect("compiles").with_discrete(1)
+    }
+
+    #[test]
+    fn the_field_of_a_region_is_the_field_to_the_bit() {
+        let system = levels(20);
+        let fields = system.region_fields().expect("40 operations");
+        let mut values = Vec::new();
+        for k in 0..=20 {
+            let signs: Vec<f64> = (0..20).map(|j| if j < k { 1.0 } else { -1.0 }).collect();
+            for q in [0.7, -0.1] {
+                let q = [q];
+                let setting = Setting::new(&signs, &q);
+                fields.settle(setting, &mut values);
+                for x in [0.1, 5.3, 19.7] {
+                    let (x, mut dx, mut expected) = ([x], [f64::NAN], [0.0]);
+                    let place = setting.at(0.0, &x);
+                    fields.eval(&place, &values, &mut dx);
+                    system.field(&place, &mut expected).expect("pure");
+                    assert_eq!(dx, expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_field_of_few_operations_on_signs_is_computed_as_a_whole() {
+        assert!(levels(3).region_fields().is_none());
+    }
+}

@@ -175,3 +175,48 @@ fn redundant_surfaces_are_named() {
         })
     );
 }
+
+/// Three belts that pull at one another: the velocity in each of the 27 modes is the one that holds the surfaces slid on, with
+/// the signs of the others.
+#[test]
+fn the_velocity_in_a_mode_holds_its_surfaces() {
+    let n = [[-1.0, 0.2, 0.1], [0.3, -1.5, 0.2], [0.0, 0.4, -0.8]];
+    let system = ClosureSystem::new(
+        3,
+        3,
+        move |_t, x, s, dx| {
+            for i in 0..3 {
+                let pull: f64 = (0..3).map(|j| n[i][j] * s[j]).sum();
+                dx[i] = 0.3 + 0.1 * i as f64 - x[i] + pull;
+            }
+        },
+        |_t, x, h| h.copy_from_slice(x),
+    )
+    .with_affine_signs();
+    let affine = system.affine_signs().expect("declared");
+    let mut parts = affine.affine_parts(&[0, 1, 2]).expect("declared");
+    let place = Place::new(0.0, &[0.0; 3], &[1.0, -1.0, 1.0]);
+    parts.evaluate(affine, &place).expect("pure");
+    for pattern in 0..27_usize {
+        let entry = |j: usize| (pattern / 3_usize.pow(j as u32) % 3) as i8 - 1;
+        let velocity = parts.velocity_in(entry).expect("determined");
+        let mut signs = [0.0; 3];
+        // The multipliers follow from the velocities that are zero, by sweeps: each row is dominated by its own.
+        for _ in 0..200 {
+            for i in 0..3 {
+                let others: f64 = (0..3).filter(|&j| j != i).map(|j| n[i][j] * signs[j]).sum();
+                signs[i] = match entry(i) {
+                    0 => -(0.3 + 0.1 * i as f64 + others) / n[i][i],
+                    side => f64::from(side),
+                };
+            }
+        }
+        let mut expected = [0.0; 3];
+        system
+            .field(&Place::new(0.0, &[0.0; 3], &signs), &mut expected)
+            .expect("pure");
+        for (v, e) in velocity.iter().zip(expected) {
+            assert!((v - e).abs() < 1e-9, "mode {pattern}: {velocity:?}");
+        }
+    }
+}
