@@ -52,8 +52,7 @@ fn decide_block(block: &SparseRows) -> Option<bool> {
     Some(has_positive_minors(&dense))
 }
 
-/// Does the comparison matrix map some positive vector to a positive
-/// vector? Then it is an M-matrix.
+/// Does the comparison matrix map some positive vector to a positive vector? Then it is an M-matrix.
 fn is_h_matrix(block: &SparseRows) -> bool {
     let m = block.n_rows();
     let comparison = block.comparison();

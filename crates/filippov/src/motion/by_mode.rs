@@ -98,7 +98,8 @@ impl<'a> ModeField<'a> {
         }
     }
 
-    /// Becomes the field of another mode of its kind; `false` if it is of another kind, or slides on other surfaces where these are several.
+    /// Becomes the field of another mode of its kind; `false` if it is of another kind, or slides on several surfaces that are not
+    /// those of the mode.
     pub(crate) fn restart(&mut self, sliding: &[usize], setting: Setting<'_>) -> bool {
         match (self, sliding) {
             (ModeField::Region(field), []) => field.restart(setting),
