@@ -23,12 +23,25 @@ from measure import Line, circumstances, interleaved, report, write_section
 Array = npt.NDArray[np.float64]
 
 N_ROUNDS = 3
+N_ROUNDS_OF_SHORT_CALLS = 9
 NEVER = 50.0  # no oscillation comes near
 
 
-def median_ratio(slow: Callable[[], Any], fast: Callable[[], Any]) -> tuple[float, float, float]:
-    """Return the median of the ratios of two calls made in turn, and the median seconds of both."""
-    times = interleaved({"slow": slow, "fast": fast}, N_ROUNDS)
+def median_ratio(
+    slow: Callable[[], Any], fast: Callable[[], Any], times_each: int = 1
+) -> tuple[float, float, float]:
+    """Return the median of the ratios of two calls made in turn, and the median seconds of both.
+
+    Short calls are made so many times each before it is the turn of the other one: the first of them finds
+    cold caches.
+    """
+
+    def many(call: Callable[[], Any]) -> Callable[[], Any]:
+        return lambda: [call() for _ in range(times_each)]
+
+    rounds = N_ROUNDS if times_each == 1 else N_ROUNDS_OF_SHORT_CALLS
+    measured = interleaved({"slow": many(slow), "fast": many(fast)}, rounds)
+    times = {name: seconds / times_each for name, seconds in measured.items()}
     slow_times, fast_times = times["slow"], times["fast"]
     return (
         float(np.median(slow_times / fast_times)),
@@ -206,7 +219,8 @@ def contacts() -> list[Line]:
     from modes import friction_chain
 
     lines = []
-    for d, limit in ((10, 4.0), (100, 2.0), (1000, 1.0)):
+    # As often before as in `counts.py`: a program that a run calls once is native code from run 500 on.
+    for d, limit, warm in ((10, 4.0, 2050), (100, 2.0, 210), (1000, 1.0, 1)):
         system, start = fl.System(chain(d), n=2 * d), start_of_chain(d)
         loop = switching_loop(friction_chain(d, 20.0))
 
@@ -216,10 +230,10 @@ def contacts() -> list[Line]:
         def theirs(loop: Any = loop) -> Any:
             return loop(1e-6)
 
-        for _ in range(300 if d == 10 else 20 if d == 100 else 1):
+        for _ in range(warm):
             ours()
         n_ours, n_theirs = len(ours().switches), len(theirs().times)
-        ratio, slow, fast = median_ratio(ours, theirs)
+        ratio, slow, fast = median_ratio(ours, theirs, max(1, 200 // d))
         lines.append(
             Line(
                 f"chain with friction, d = {d}: ours / numba's loop",
@@ -260,9 +274,10 @@ def idle() -> list[Line]:
 
             counts = [attempts(run(k)) for k in (0, 1)]
             for k in (0, 1):
-                for _ in range(60):
+                for _ in range(600):
                     run(k)
-            ratio, slow, fast = median_ratio(lambda run=run: run(0), lambda run=run: run(1))
+            calls = [lambda run=run, k=k: run(k) for k in (0, 1)]
+            ratio, slow, fast = median_ratio(calls[0], calls[1], 50)
             what = "bent" if is_bent else "linear"
             lines.append(
                 Line(
