@@ -28,7 +28,7 @@ debian_rustc() {
 
 build_engine() {
     # Functions are copied to where they are called only if they are very short: a twentieth less to load.
-    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-Cllvm-args=--inline-threshold=10"
+    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-Cllvm-args=--inline-threshold=4"
     if has_target || { command -v rustup >/dev/null 2>&1 && rustup target add $target; }; then
         "$CARGO" build --profile web --target $target -p filippov-web -p filippov-text
     elif debian_rustc; then

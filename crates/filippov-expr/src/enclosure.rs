@@ -79,7 +79,12 @@ impl EnclosureProgram {
         let Lengths {
             signs, parameters, ..
         } = Schedule::new(graph, outputs)?.lengths;
-        let (tape, settled) = match graph.settled(outputs)? {
+        // The page does without: its module is to be small.
+        let settled = match cfg!(target_family = "wasm") {
+            true => None,
+            false => graph.settled(outputs)?,
+        };
+        let (tape, settled) = match settled {
             None => (tape(graph, outputs)?, None),
             Some(found) => {
                 let values = SettledValues {

@@ -23,7 +23,7 @@
 
 use std::borrow::Cow;
 
-use super::shared_load::{idle, largest, uniqueness, SharedLoads, Uniqueness};
+use super::shared_load::{idle, largest, KnownUniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
 use crate::tolerances::{DEFINITE_PIVOT, EPS, LARGEST_BY_MINORS};
@@ -105,10 +105,11 @@ pub enum RelayError {
 /// # Ok::<(), filippov::switching::RelayError>(())
 /// ```
 pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolution, RelayError> {
-    solve_relay_within(problem, before, Patience::endless())
+    let known = &mut KnownUniqueness::default();
+    solve_relay_within(problem, before, Patience::endless(), known)
 }
 
-/// As [`solve_relay`], as long as the caller waits.
+/// As [`solve_relay`], as long as the caller waits, with what is known of other problems.
 ///
 /// # Errors
 /// As [`solve_relay`]; [`RelayError::Undecided`] also when the caller has waited long enough.
@@ -116,11 +117,12 @@ pub fn solve_relay_within(
     problem: &RelayProblem,
     before: &[i8],
     patience: Patience,
+    known: &mut KnownUniqueness,
 ) -> Result<RelaySolution, RelayError> {
     if !problem.n.is_finite() || !problem.nu.iter().all(|v| v.is_finite()) {
         return Err(RelayError::NotFinite);
     }
-    let mut pivots = Pivots::new(problem, patience);
+    let mut pivots = Pivots::new(problem, patience, known);
     let state = pivots.only_state().or_else(|| pivots.proximal(before));
     let found = state.and_then(|state| pivots.solution(state));
     let mut solution = found.ok_or(RelayError::Undecided {
@@ -155,7 +157,7 @@ struct Pivots<'a> {
 }
 
 impl<'a> Pivots<'a> {
-    fn new(problem: &'a RelayProblem, patience: Patience<'a>) -> Self {
+    fn new(problem: &'a RelayProblem, patience: Patience<'a>, known: &mut KnownUniqueness) -> Self {
         let m = problem.nu.len();
         let ones = vec![1.0; m];
         let is_idle = idle(&problem.n, |i| problem.rounding(&ones, i));
@@ -166,7 +168,7 @@ impl<'a> Pivots<'a> {
             problem.to_mut().n = problem.n.with_columns_scaled(&acts);
         }
         let acting: Vec<usize> = (0..m).filter(|&i| !is_idle[i]).collect();
-        let uniqueness = uniqueness(&problem.n.principal(&acting));
+        let uniqueness = known.of(&problem.n.principal(&acting));
         Pivots {
             nu: problem.nu.clone(),
             damped: None,

@@ -151,6 +151,39 @@ pub enum Uniqueness {
     Unknown,
 }
 
+/// Matrices about which is known how many solutions there are, those asked about last.
+#[derive(Debug, Default)]
+pub struct KnownUniqueness(Vec<(SparseRows, Uniqueness)>);
+
+impl Clone for KnownUniqueness {
+    /// A copy of a run finds out by itself.
+    fn clone(&self) -> Self {
+        KnownUniqueness::default()
+    }
+}
+
+/// So many are kept: a run comes back to few sets of contacts that act on one another.
+const MOST_KNOWN: usize = 8;
+
+impl KnownUniqueness {
+    /// What N says of the solutions, found now or before.
+    pub(super) fn of(&mut self, normal: &SparseRows) -> Uniqueness {
+        // What is found at once need not be kept; nor on the page, whose module is to be small.
+        if normal.is_diagonal() || cfg!(target_family = "wasm") {
+            return uniqueness(normal);
+        }
+        let place = self.0.iter().position(|(known, _)| known == normal);
+        let known = match place {
+            Some(place) => self.0.remove(place),
+            None => (normal.clone(), uniqueness(normal)),
+        };
+        let answer = known.1;
+        self.0.truncate(MOST_KNOWN - 1);
+        self.0.insert(0, known);
+        answer
+    }
+}
+
 /// What N says of the solutions for every nu: one if -N is a P-matrix, one motion if it is so in some components, and becomes
 /// symmetric and semidefinite by a scaling of the columns in the others.
 pub(super) fn uniqueness(normal: &SparseRows) -> Uniqueness {

@@ -228,7 +228,7 @@ pub(crate) fn surfaces_left(
 
 /// The velocity in a mode by the fields around the point; `None` if they do not determine it.
 fn velocity_in(parts: &AffineParts, mode: &Mode) -> Option<Vec<f64>> {
-    let velocity = parts.velocity_in(|j| mode.entries()[j])?;
+    let velocity = parts.velocity_in(mode.entries())?;
     velocity.iter().all(|v| v.is_finite()).then_some(velocity)
 }
 

@@ -5,6 +5,7 @@ use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
+use crate::cube::KnownUniqueness;
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::mode::{Mode, Signs};
@@ -37,6 +38,8 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub q: &'p [f64],
     pub arrival: &'p Arrival<'m, 'a>,
     pub policy: Policy<'a>,
+    /// What is known of the equations at meetings.
+    pub known: &'p RefCell<KnownUniqueness>,
     /// How long the caller waits.
     pub patience: Patience<'p>,
 }

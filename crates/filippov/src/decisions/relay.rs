@@ -175,7 +175,8 @@ fn relay_at(
         n: parts.normal().clone(),
         noise,
     };
-    let Ok(mut solution) = solve_relay_within(&problem, &before, at.patience) else {
+    let known = &mut at.known.borrow_mut();
+    let Ok(mut solution) = solve_relay_within(&problem, &before, at.patience, known) else {
         return Ok(None);
     };
     if !stay_together(&problem.n, gradients, &solution.loops) {

@@ -57,6 +57,7 @@ impl<'a> Scene<'_, 'a> {
             q: &motion.discrete,
             arrival: &arrival,
             policy: run.options.into(),
+            known: &run.known,
             patience: self.patience,
         };
         question(&at, notes)

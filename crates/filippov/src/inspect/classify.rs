@@ -180,7 +180,9 @@ pub fn classify(
         nonunique: NonUnique::Regularize,
         choices: &[],
     };
+    let known = RefCell::default();
     let point = |arrival| Point {
+        known: &known,
         system,
         actions: &actions,
         scale: &scale,

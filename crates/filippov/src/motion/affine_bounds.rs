@@ -24,6 +24,8 @@ use crate::system::{AffineSigns, Setting};
 #[derive(Clone)]
 pub struct AffineBounds {
     matrix: SparseRows,
+    /// Contacts whose sign acts on no other rate, and whose rate no other sign acts on.
+    is_uncoupled: Vec<bool>,
     normal: RefCell<SparseSolver>,
     comparison: RefCell<SparseSolver>,
 }
@@ -34,6 +36,17 @@ pub struct EnclosedMultipliers {
     pub values: IntervalVector,
     /// Their derivatives in time; empty if they are not known to be finite.
     pub rates: IntervalVector,
+}
+
+/// What is known of the multipliers.
+#[derive(Clone, Copy, Default)]
+pub struct KnownMultipliers<'k> {
+    /// Numbers near to them.
+    pub near: &'k [f64],
+    /// Those at the start of the piece of motion, if they are known.
+    pub start: Option<&'k [f64]>,
+    /// Those that are far from their ends, and not asked for; none if it is empty.
+    pub far: &'k [bool],
 }
 
 impl AffineBounds {
@@ -48,28 +61,35 @@ impl AffineBounds {
         let is_m_matrix = positive.iter().all(|v| v.is_finite() && *v > 0.0);
         is_m_matrix.then(|| AffineBounds {
             matrix: matrix.clone(),
+            is_uncoupled: uncoupled(matrix),
             normal: RefCell::new(normal),
             comparison: RefCell::new(comparison),
         })
     }
 
-    /// The multipliers along a piece of motion, from their values `near` it, and those at its `start` if they are known: where nothing
-    /// moves that a rate reads, it is what it is there. `None` if a rate of a switching function has no bounds.
+    /// The multipliers along a piece of motion. Where nothing moves that a rate reads, it is what it is at the start; those that are far
+    /// from their ends have no bounds if no other depends on them. `None` if a rate of a switching function has no bounds.
     pub fn enclose(
         &self,
         affine: &dyn AffineSigns,
         set: &[usize],
         motion: &dyn Motion,
         setting: Setting<'_>,
-        near: &[f64],
-        start: Option<&[f64]>,
+        known: KnownMultipliers<'_>,
     ) -> Option<EnclosedMultipliers> {
+        let KnownMultipliers { near, start, far } = known;
+        let is_left_out = |row: usize| far.get(row) == Some(&true) && self.is_uncoupled[row];
         let mut signs = Signs::from_slice(setting.signs);
         for (&j, &lambda) in set.iter().zip(near) {
             signs[j] = lambda;
         }
         let (mut values, mut rates) = (IntervalVector::new(), IntervalVector::new());
         for (row, &j) in set.iter().enumerate() {
+            if is_left_out(row) {
+                values.push(Interval::ZERO);
+                rates.push(Interval::ZERO);
+                continue;
+            }
             let still = start.filter(|_| !affine.rate_moves(j, motion));
             let enclosure = match still {
                 Some(start) => {
@@ -87,7 +107,13 @@ impl AffineBounds {
         for (value, &lambda) in values.iter_mut().zip(near) {
             *value = *value + Interval::point(lambda);
         }
-        let rates = self.changes(&rates).unwrap_or_default();
+        let mut rates = self.changes(&rates).unwrap_or_default();
+        for row in (0..set.len()).filter(|&row| is_left_out(row)) {
+            values[row] = Interval::ALL;
+            if let Some(rate) = rates.get_mut(row) {
+                *rate = Interval::ALL;
+            }
+        }
         Some(EnclosedMultipliers { values, rates })
     }
 
@@ -110,13 +136,30 @@ impl AffineBounds {
     }
 }
 
+fn uncoupled(matrix: &SparseRows) -> Vec<bool> {
+    let mut is_uncoupled = vec![true; matrix.n_rows()];
+    for i in 0..matrix.n_rows() {
+        for &j in matrix.columns(i).iter().filter(|&&j| j != i) {
+            (is_uncoupled[i], is_uncoupled[j]) = (false, false);
+        }
+    }
+    is_uncoupled
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use filippov_expr::{Backend, Enclosure, Graph, Interval, Motion, Names};
 
-    use super::AffineBounds;
+    use super::{AffineBounds, KnownMultipliers};
     use crate::system::{AffineSigns, PiecewiseSystem, Place, Setting, TracedSystem};
+
+    fn near_to(near: &[f64]) -> KnownMultipliers<'_> {
+        KnownMultipliers {
+            near,
+            ..KnownMultipliers::default()
+        }
+    }
 
     /// Three belts that pull at one another: v_i' = sin(t + i) + x_i^2 - sign(v_i) - 0.3 sum of the other signs.
     fn belts() -> TracedSystem {
@@ -197,8 +240,7 @@ mod tests {
                     &set,
                     &motion,
                     Setting::of_signs(&signs),
-                    &near,
-                    None,
+                    near_to(&near),
                 )
                 .unwrap();
             for k in 0..=20 {
@@ -263,7 +305,11 @@ mod tests {
         let signs = [1.0; 2];
         let setting = Setting::of_signs(&signs);
         let enclose = |start| {
-            let found = bounds.enclose(affine, &[0, 1], &Still(&x), setting, &[0.1, 0.2], start);
+            let known = KnownMultipliers {
+                start,
+                ..near_to(&[0.1, 0.2])
+            };
+            let found = bounds.enclose(affine, &[0, 1], &Still(&x), setting, known);
             found.unwrap().values
         };
         assert!((0..2).all(|i| !affine.rate_moves(i, &Still(&x))));

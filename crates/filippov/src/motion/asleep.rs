@@ -174,8 +174,8 @@ impl Asleep {
     }
 }
 
-/// The box as a motion of which nothing else is known.
-struct Around<'a>(&'a [[f64; 2]]);
+/// A box, time first, as a motion of which nothing else is known.
+pub(super) struct Around<'a>(pub &'a [[f64; 2]]);
 
 impl Motion for Around<'_> {
     fn time(&self) -> Interval {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
+use super::far_ends::FarEnds;
 use super::{
     AffineBounds, Asleep, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField,
     SlidingSet, Triggers,
@@ -45,6 +46,8 @@ pub(crate) struct CurrentMotion<'a> {
     pub sliding: SlidingSet,
     /// Bounds of their multipliers, once they were asked for and if there are any.
     pub affine_bounds: Option<Option<AffineBounds>>,
+    /// Which of these do not come to their ends.
+    pub far_ends: FarEnds,
     /// All of them are affine: the continuous extension of a step does not leave them.
     pub is_straight: bool,
     /// Fields of other kinds, or on other surfaces, that earlier motions had, kept for their buffers.
@@ -92,6 +95,7 @@ impl<'a> CurrentMotion<'a> {
             active: SmallVec::new(),
             field: ModeField::new(system, law, &sliding, setting),
             affine_bounds: None,
+            far_ends: FarEnds::default(),
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
@@ -142,6 +146,7 @@ impl<'a> CurrentMotion<'a> {
         self.mode = mode;
         self.t_start = t_start;
         self.affine_bounds = None;
+        self.far_ends.restart();
         self.is_straight = self.sliding.iter().all(|&j| system.is_affine(j));
         self.restart_field(system);
         self.find_monitored(system, zeros);
@@ -187,6 +192,7 @@ impl<'a> CurrentMotion<'a> {
     /// An action has changed the discrete states.
     pub fn set_discrete(&mut self, q: Vec<f64>) {
         self.field.set_discrete(&q);
+        self.far_ends.restart();
         self.discrete = q;
     }
 

@@ -173,9 +173,9 @@ impl<'a> IntersectionField<'a> {
         true
     }
 
-    /// Is it worth to be kept for another motion on the same surfaces?
+    /// Is it worth to be kept for another motion on the same surfaces? Not on the page, whose module is to be small.
     pub fn is_lasting(&self) -> bool {
-        self.affine.is_some() && self.by_rule.is_none()
+        !cfg!(target_family = "wasm") && self.affine.is_some() && self.by_rule.is_none()
     }
 
     /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the

@@ -9,6 +9,7 @@ mod canopy;
 mod contact;
 mod current;
 mod duties;
+mod far_ends;
 mod guard;
 mod intersection;
 mod leading;
@@ -27,7 +28,7 @@ mod two_fold_motion;
 pub mod weights;
 
 pub use affine::AffineLaw;
-pub use affine_bounds::{AffineBounds, EnclosedMultipliers};
+pub use affine_bounds::{AffineBounds, EnclosedMultipliers, KnownMultipliers};
 pub(crate) use asleep::Asleep;
 pub(crate) use by_mode::{Law, ModeField, SlidingSet};
 pub use by_rule::RuleLaw;

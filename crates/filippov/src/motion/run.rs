@@ -1,6 +1,9 @@
 //! A run at the place that it has reached.
 
+use std::cell::RefCell;
+
 use super::{Asleep, CurrentMotion, Seen};
+use crate::cube::KnownUniqueness;
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::options::Options;
@@ -27,6 +30,8 @@ pub(crate) struct Run<'a> {
     pub residuals: Vec<f64>,
     /// Triggers whose action leaves the motion as it is: it goes through them.
     pub passing: Vec<usize>,
+    /// What its decisions found out of the equations at meetings.
+    pub known: RefCell<KnownUniqueness>,
     pub stats: Stats,
 }
 
@@ -57,6 +62,7 @@ impl<'a> Run<'a> {
             seen: Vec::new(),
             residuals: Vec::new(),
             passing: Vec::new(),
+            known: RefCell::default(),
             stats: Stats::default(),
         }
     }

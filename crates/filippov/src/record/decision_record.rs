@@ -181,6 +181,7 @@ pub fn replay_decision(
         q: &point.q,
         arrival: &arrival,
         policy: Policy::from(options),
+        known: &RefCell::default(),
         patience: Patience::endless(),
     };
     let mut notes = Notes {

@@ -17,9 +17,9 @@ pub use crate::cube::{
     enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
     is_undetermined, least_multipliers, merged_root, multiplier_rates, newton, roots_in_cube,
     scaling_margin, solve_relay, solve_relay_within, stability_margins, stable_roots,
-    stable_roots_with_border, stable_roots_within, Bilinear, EnclosedRoot, IntervalVector, Lap,
-    Matrix, MergedRoot, NormalFields, RelayError, RelayProblem, RelaySolution, Root, RootBounds,
-    Roots, SharedLoad, SharedLoads, SignGroup, Uniqueness, Vector,
+    stable_roots_with_border, stable_roots_within, Bilinear, EnclosedRoot, IntervalVector,
+    KnownUniqueness, Lap, Matrix, MergedRoot, NormalFields, RelayError, RelayProblem,
+    RelaySolution, Root, RootBounds, Roots, SharedLoad, SharedLoads, SignGroup, Uniqueness, Vector,
 };
 pub use crate::error::Undecided;
 pub use crate::motion::{first_nonzero, normal_component, Leading, TwoFold, TwoFoldMotion};

@@ -314,9 +314,10 @@ impl AffineParts {
     }
 
     /// The velocity of a motion that slides on those of the surfaces whose entry is 0, and has left the others to these
-    /// sides, at the point of the evaluation. `None` where its multipliers are not determined.
-    pub fn velocity_in(&self, entries: impl Fn(usize) -> i8) -> Option<Vec<f64>> {
-        let mut signs: Vec<f64> = self.surfaces.iter().map(|&j| entries(j).into()).collect();
+    /// sides, at the point of the evaluation; there is an entry for every surface of the system. `None` where its multipliers
+    /// are not determined.
+    pub fn velocity_in(&self, entries: &[i8]) -> Option<Vec<f64>> {
+        let mut signs: Vec<f64> = self.surfaces.iter().map(|&j| entries[j].into()).collect();
         let rows = 0..signs.len();
         let slid: Vec<usize> = rows.filter(|&row| signs[row] == 0.0).collect();
         let normal = &self.normal.matrix;

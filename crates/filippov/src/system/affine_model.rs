@@ -220,24 +220,8 @@ impl AffineModel {
         Some(out[0])
     }
 
-    /// Evaluates what varies of [`parts`](Self::parts).
-    pub fn fill(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts) {
-        self.fill_rows(place, parameters, parts, |j| self.varies[j]);
-    }
-
-    /// Evaluates everything, for parts whose jumps have been stretched.
-    pub fn fill_anew(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts) {
-        self.fill_rows(place, parameters, parts, |_| true);
-    }
-
-    /// Evaluates the field, and the rows of these surfaces.
-    fn fill_rows(
-        &self,
-        place: &Place<'_>,
-        parameters: &[f64],
-        parts: &mut AffineParts,
-        is_asked: impl Fn(usize) -> bool,
-    ) {
+    /// Evaluates what varies of [`parts`](Self::parts); with `anew`, for parts whose jumps have been stretched, everything.
+    pub fn fill(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts, anew: bool) {
         let program = self.program.program();
         let mut outputs = std::mem::take(&mut parts.outputs);
         outputs.resize(program.n_outputs(), 0.0);
@@ -250,7 +234,7 @@ impl AffineModel {
         let (mut in_gradients, mut in_jumps) = (0, 0);
         for row in 0..parts.surfaces().len() {
             let j = parts.surfaces()[row];
-            if !is_asked(j) {
+            if !(anew || self.varies[j]) {
                 in_gradients += self.gradients[j].len();
                 in_jumps += self.jumps[j].len();
                 continue;

@@ -312,9 +312,12 @@ impl Model {
         made.program()
     }
 
-    /// The field in one region, where signs and parameters alone make much of it.
+    /// The field in one region, where signs and parameters alone make much of it. The page does without: its module is to be small.
     #[inline]
     pub fn region_program(&self) -> Option<&RegionProgram> {
+        if cfg!(target_family = "wasm") {
+            return None;
+        }
         let made = self
             .region_program
             .get_or_init(|| RegionProgram::new(&self.graph, &self.field, self.backend));

@@ -175,6 +175,13 @@ pub const FEWEST_ASLEEP: usize = 8;
 /// that, and of the size of the state: it is left a few times in a run.
 pub const BOX_GROWTH: f64 = 2.0;
 
+/// Steps of a motion on several surfaces before its multipliers are bounded over a box, and how many steps such a box reaches ahead at
+/// first: more than most motions between two switches of many contacts take.
+pub const STEPS_BEFORE_BOX: u32 = 4;
+
+/// A box reaches no more steps ahead: bounds become wide with it.
+pub const MOST_BOX_STEPS: f64 = 64.0;
+
 /// A function keeps its sign in the box if its least value there is this share of its largest: values within rounding count as zeros.
 pub const CLEAR_IN_BOX: f64 = 1e-6;
 

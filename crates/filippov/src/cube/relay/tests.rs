@@ -27,7 +27,8 @@ fn solved(nu: &[f64], rows: &[Vec<f64>], before: &[i8]) -> RelaySolution {
 /// hold a continuum.
 fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
     let m = problem.nu.len();
-    let mut pivots = Pivots::new(problem, Patience::endless());
+    let known = &mut crate::cube::KnownUniqueness::default();
+    let mut pivots = Pivots::new(problem, Patience::endless(), known);
     let (mut found, mut has_singular) = (Vec::new(), false);
     for pattern in 0..3_usize.pow(m as u32) {
         let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;

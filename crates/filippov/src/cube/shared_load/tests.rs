@@ -89,3 +89,19 @@ fn friction_has_one_motion_though_its_contacts_be_redundant() {
         vec![2.0, 0.0]
     ])));
 }
+
+#[test]
+fn what_is_known_of_a_matrix_is_what_is_found_anew() {
+    let mut known = KnownUniqueness::default();
+    let matrices: Vec<SparseRows> = (1..=12)
+        .map(|k| two_bodies([0.1 * f64::from(k), 0.7, 0.3]))
+        .chain([SparseRows::from_dense(&[vec![-1.0, 0.4], vec![0.3, -1.0]])])
+        .chain([SparseRows::from_dense(&[vec![-1.0, 3.0], vec![3.0, -1.0]])])
+        .collect();
+    for _ in 0..2 {
+        for matrix in matrices.iter().chain(matrices.iter().rev()) {
+            assert_eq!(known.of(matrix), uniqueness(matrix));
+            assert!(known.0.len() <= MOST_KNOWN);
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use filippov_expr::{Enclosure, Interval};
+use filippov_expr::{Enclosure, Interval, Motion};
 use smallvec::SmallVec;
 
 use crate::cube::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
@@ -10,7 +10,7 @@ use crate::event::certificate::Bound;
 use crate::event::tube::{RememberedTube, Tube};
 use crate::mode::Signs;
 use crate::motion::Monitored;
-use crate::motion::{AffineBounds, Guard, RootEnd, Seen};
+use crate::motion::{AffineBounds, Guard, KnownMultipliers, RootEnd, Seen};
 use crate::stepper::Interpolant;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{EPS, MOST_ENCLOSED, ROOT_BOXES};
@@ -29,6 +29,8 @@ pub(crate) struct BoundedCurve<'a> {
     pub seen: &'a [Seen],
     /// Bounds of many multipliers, where the field is affine in the signs.
     pub affine: Option<&'a AffineBounds>,
+    /// Which of them are not asked for.
+    pub far: &'a [bool],
     /// Whether the exit functions are those of the multipliers of the canopy.
     pub by_multipliers: bool,
     /// The normal components on pieces of this extension: they are asked for one after the other.
@@ -137,7 +139,15 @@ impl BoundedCurve<'_> {
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.sliding_system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
-            let tube = RememberedTube::new(&tube, self.interpolant.n_states());
+            let remembered;
+            // The page does without: its module is to be small.
+            let tube: &dyn Motion = match cfg!(target_family = "wasm") {
+                true => &tube,
+                false => {
+                    remembered = RememberedTube::new(&tube, self.interpolant.n_states());
+                    &remembered
+                }
+            };
             let exits = || self.seen.chunks_exact(2).take(self.sliding.len());
             let middles = exits().map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
@@ -145,8 +155,12 @@ impl BoundedCurve<'_> {
             let is_plain =
                 exits().all(|pair| (pair[0].start + pair[1].start - 2.0).abs() <= 8.0 * EPS);
             let start: Vector = exits().map(|pair| pair[0].start - 1.0).collect();
-            let start = is_plain.then_some(&start[..]);
-            let found = bounds.enclose(affine, self.sliding, &tube, self.setting, &near, start);
+            let known = KnownMultipliers {
+                near: &near,
+                start: is_plain.then_some(&start[..]),
+                far: self.far,
+            };
+            let found = bounds.enclose(affine, self.sliding, tube, self.setting, known);
             return Some(found.map_or(RootBounds::Unproved, |found| {
                 RootBounds::Proved(EnclosedRoot {
                     multipliers: found.values,

@@ -256,6 +256,7 @@ impl StepSearch<'_, '_> {
                 .and_then(Option::as_ref),
             by_multipliers,
             known_exits: &self.detector.enclosed_exits,
+            far: self.run.motion.far_ends.places(),
             known_roots: &self.detector.enclosed_roots,
         };
         let mut curve = Curve {

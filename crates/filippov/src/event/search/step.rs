@@ -14,7 +14,7 @@ use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{Event, Found};
-use crate::motion::{AffineBounds, Guard, ModeField, Monitored};
+use crate::motion::{AffineBounds, Guard, KnownMultipliers, ModeField, Monitored};
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::system::is_zero_within;
@@ -141,6 +141,7 @@ impl StepSearch<'_, '_> {
         self.measure_margin(sought.dt)?;
         if self.run.motion.sliding.len() > 1 {
             self.prepare_bounds();
+            self.watch_far_ends();
         }
         for is_beyond in [true, false] {
             for index in 0..self.run.motion.monitored.len() {
@@ -307,7 +308,12 @@ impl StepSearch<'_, '_> {
     /// What bounds over the step up to `reach` prove about a function.
     pub(crate) fn prove_clear(&self, index: usize, value_at_end: f64, reach: f64) -> Proof {
         let m = self.run.motion.monitored[index];
-        if value_at_end > 0.0 && is_known_clear(&m, &self.detector.enclosed_roots.borrow(), reach) {
+        let is_far = || {
+            let is_end = matches!(m.guard, Guard::Multiplier { .. });
+            is_end && self.run.motion.far_ends.is_far(m.place / 2)
+        };
+        let is_clear = || is_known_clear(&m, &self.detector.enclosed_roots.borrow(), reach);
+        if value_at_end > 0.0 && (is_far() || is_clear()) {
             return Proof::Clear;
         }
         let curve = BoundedCurve {
@@ -321,6 +327,7 @@ impl StepSearch<'_, '_> {
             affine: self.run.motion.affine_bounds(),
             by_multipliers: !self.run.motion.slides_by_rule() && self.run.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,
+            far: self.run.motion.far_ends.places(),
             known_roots: &self.detector.enclosed_roots,
         };
         // Next to a zero that is divided out the function itself may only rise.
@@ -350,6 +357,30 @@ impl StepSearch<'_, '_> {
         if let ModeField::Intersection(field) = &motion.field {
             motion.affine_bounds = Some(field.steady_normal().and_then(AffineBounds::new));
         }
+    }
+
+    /// Finds out which multipliers stay away from their ends along the step, and for how long.
+    fn watch_far_ends(&mut self) {
+        let motion = &mut self.run.motion;
+        let has_bounds = matches!(motion.affine_bounds, Some(Some(_))) && motion.has_bounds();
+        if !has_bounds || motion.slides_by_rule() || !motion.far_ends.is_due() {
+            return;
+        }
+        let ranges = rough_ranges(self.stepper.interpolant(), &self.detector.margin);
+        let mut ends = std::mem::take(&mut motion.far_ends);
+        let (set, setting) = (motion.sliding(), motion.setting());
+        let near = motion.multipliers();
+        let affine = motion.sliding_system(self.run.system).affine_signs();
+        ends.follow(&ranges, |around| {
+            let bounds = motion.affine_bounds()?;
+            let known = KnownMultipliers {
+                near: &near,
+                ..KnownMultipliers::default()
+            };
+            let found = bounds.enclose(affine?, set, around, setting, known)?;
+            Some(found.values)
+        });
+        self.run.motion.far_ends = ends;
     }
 
     /// How far the motion lies beside the continuous extension, from the probes of the step.

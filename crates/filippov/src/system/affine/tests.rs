@@ -199,7 +199,9 @@ fn the_velocity_in_a_mode_holds_its_surfaces() {
     parts.evaluate(affine, &place).expect("pure");
     for pattern in 0..27_usize {
         let entry = |j: usize| (pattern / 3_usize.pow(j as u32) % 3) as i8 - 1;
-        let velocity = parts.velocity_in(entry).expect("determined");
+        let velocity = parts
+            .velocity_in(&[0, 1, 2].map(entry))
+            .expect("determined");
         let mut signs = [0.0; 3];
         // The multipliers follow from the velocities that are zero, by sweeps: each row is dominated by its own.
         for _ in 0..200 {

@@ -19,7 +19,7 @@ impl AffineSigns for TracedSystem {
     ) -> Result<u64, FieldError> {
         let compiled = self.model.affine_signs();
         if !self.model.has_sticking() {
-            self.with_values(place.q, |p| compiled.fill(place, p, parts));
+            self.with_values(place.q, |p| compiled.fill(place, p, parts, false));
             return Ok(1);
         }
         let mut stretched = place.signs.to_vec();
@@ -32,7 +32,7 @@ impl AffineSigns for TracedSystem {
             stretched[j] *= ratio;
         }
         let place = place.with_signs(&stretched);
-        self.with_values(place.q, |p| compiled.fill_anew(&place, p, parts));
+        self.with_values(place.q, |p| compiled.fill(&place, p, parts, true));
         parts.stretch(&ratios);
         Ok(1)
     }
@@ -42,6 +42,10 @@ impl AffineSigns for TracedSystem {
     }
 
     fn rate_moves(&self, j: usize, motion: &dyn Motion) -> bool {
+        // The page does not ask: its module is to be small.
+        if cfg!(target_family = "wasm") {
+            return true;
+        }
         let model = self.model.affine_signs();
         model.read_by_rate(j).is_none_or(|states| {
             let mut rates = states.iter().map(|&i| motion.state(i).rate);
