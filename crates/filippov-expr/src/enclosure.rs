@@ -61,6 +61,9 @@ pub struct EnclosureProgram {
     n_outputs: usize,
 }
 
+/// The page does without: its module is to be small.
+const IS_SETTLED: bool = !cfg!(target_family = "wasm");
+
 /// What follows from signs and parameters alone: numbers that the program reads as parameters.
 #[derive(Debug, Clone)]
 struct SettledValues {
@@ -79,10 +82,9 @@ impl EnclosureProgram {
         let Lengths {
             signs, parameters, ..
         } = Schedule::new(graph, outputs)?.lengths;
-        // The page does without: its module is to be small.
-        let settled = match cfg!(target_family = "wasm") {
-            true => None,
-            false => graph.settled(outputs)?,
+        let settled = match IS_SETTLED {
+            true => graph.settled(outputs)?,
+            false => None,
         };
         let (tape, settled) = match settled {
             None => (tape(graph, outputs)?, None),
@@ -114,8 +116,8 @@ impl EnclosureProgram {
             return;
         }
         match &self.settled {
-            Some(values) => self.tape.enclose(motion, s, &values.behind(s, p), out),
-            None => self.tape.enclose(motion, s, p, out),
+            Some(values) if IS_SETTLED => self.tape.enclose(motion, s, &values.behind(s, p), out),
+            _ => self.tape.enclose(motion, s, p, out),
         }
     }
 }

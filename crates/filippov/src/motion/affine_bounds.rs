@@ -38,6 +38,9 @@ pub struct EnclosedMultipliers {
     pub rates: IntervalVector,
 }
 
+/// Whether it is asked which rates move: not on the page, whose module is to be small.
+const IS_ASKED: bool = !cfg!(target_family = "wasm");
+
 /// What is known of the multipliers.
 #[derive(Clone, Copy, Default)]
 pub struct KnownMultipliers<'k> {
@@ -90,7 +93,7 @@ impl AffineBounds {
                 rates.push(Interval::ZERO);
                 continue;
             }
-            let still = start.filter(|_| !affine.rate_moves(j, motion));
+            let still = start.filter(|_| IS_ASKED && !affine.rate_moves(j, motion));
             let enclosure = match still {
                 Some(start) => {
                     // Sliding makes it zero with the multipliers at the start.

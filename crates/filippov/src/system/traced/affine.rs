@@ -42,9 +42,8 @@ impl AffineSigns for TracedSystem {
     }
 
     fn rate_moves(&self, j: usize, motion: &dyn Motion) -> bool {
-        // The page does not ask: its module is to be small.
         if cfg!(target_family = "wasm") {
-            return true;
+            return true; // not asked
         }
         let model = self.model.affine_signs();
         model.read_by_rate(j).is_none_or(|states| {
