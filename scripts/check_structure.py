@@ -39,6 +39,7 @@ ROOMS = (
         "error_scale",
         "locate",
         "tolerances",
+        "page",
         "patience",
         "powers",
         "clock",

@@ -89,6 +89,7 @@ mod locate;
 mod mode;
 pub mod motion;
 mod options;
+mod page;
 mod patience;
 mod powers;
 mod record;

@@ -21,6 +21,7 @@
 //! Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.1.
 
 use crate::cube::{is_p_matrix, symmetrising_scale};
+use crate::page::IS_PAGE;
 use crate::sparse::{coupled_blocks, is_positive_definite, SparseRows, SparseSolver};
 use crate::tolerances::{DEFINITE_PIVOT, EPS, MOST_IN_LOOP};
 use crate::vectors::dot;
@@ -168,8 +169,8 @@ const MOST_KNOWN: usize = 8;
 impl KnownUniqueness {
     /// What N says of the solutions, found now or before.
     pub(super) fn of(&mut self, normal: &SparseRows) -> Uniqueness {
-        // What is found at once need not be kept; nor on the page, whose module is to be small.
-        if normal.is_diagonal() || cfg!(target_family = "wasm") {
+        // What is found at once need not be kept.
+        if normal.is_diagonal() || IS_PAGE {
             return uniqueness(normal);
         }
         let place = self.0.iter().position(|(known, _)| known == normal);

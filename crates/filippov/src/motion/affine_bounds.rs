@@ -6,6 +6,7 @@ use filippov_expr::{Enclosure, Interval, Motion};
 
 use crate::cube::{IntervalVector, Vector};
 use crate::mode::Signs;
+use crate::page::IS_PAGE;
 use crate::sparse::{SparseRows, SparseSolver};
 use crate::system::{AffineSigns, Setting};
 
@@ -37,9 +38,6 @@ pub struct EnclosedMultipliers {
     /// Their derivatives in time; empty if they are not known to be finite.
     pub rates: IntervalVector,
 }
-
-/// Whether it is asked which rates move: not on the page, whose module is to be small.
-const IS_ASKED: bool = !cfg!(target_family = "wasm");
 
 /// What is known of the multipliers.
 #[derive(Clone, Copy, Default)]
@@ -93,7 +91,7 @@ impl AffineBounds {
                 rates.push(Interval::ZERO);
                 continue;
             }
-            let still = start.filter(|_| IS_ASKED && !affine.rate_moves(j, motion));
+            let still = start.filter(|_| !IS_PAGE && !affine.rate_moves(j, motion));
             let enclosure = match still {
                 Some(start) => {
                     // Sliding makes it zero with the multipliers at the start.

@@ -4,10 +4,8 @@ use filippov_expr::Motion;
 
 use super::asleep::Around;
 use crate::cube::IntervalVector;
+use crate::page::IS_PAGE;
 use crate::tolerances::{CLEAR_IN_BOX, MOST_BOX_STEPS, STEPS_BEFORE_BOX};
-
-/// The page does without boxes: its module is to be small.
-const IS_USED: bool = !cfg!(target_family = "wasm");
 
 /// Multipliers that bounds over a box of times and states keep away from their ends. While the motion stays in the box their exit
 /// functions have no zero, and no step has to prove that anew.
@@ -58,16 +56,16 @@ impl FarEnds {
     /// Those by their places; empty if there are none.
     #[inline]
     pub fn places(&self) -> &[bool] {
-        match IS_USED {
-            true => &self.is_far,
-            false => &[],
+        match IS_PAGE {
+            true => &[],
+            false => &self.is_far,
         }
     }
 
     /// Does a step have to ask whether it leaves the box, or for a new one? The first ones do not.
     #[inline]
     pub fn is_due(&mut self) -> bool {
-        if !IS_USED {
+        if IS_PAGE {
             return false;
         }
         if !self.around.is_empty() || self.wait == 0 {

@@ -11,6 +11,7 @@ use super::{
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
+use crate::page::IS_PAGE;
 use crate::patience::Patience;
 use crate::sparse::SparseRows;
 use crate::system::{OwnSetting, PiecewiseSystem, Setting};
@@ -173,9 +174,9 @@ impl<'a> IntersectionField<'a> {
         true
     }
 
-    /// Is it worth to be kept for another motion on the same surfaces? Not on the page, whose module is to be small.
+    /// Is it worth to be kept for another motion on the same surfaces?
     pub fn is_lasting(&self) -> bool {
-        !cfg!(target_family = "wasm") && self.affine.is_some() && self.by_rule.is_none()
+        !IS_PAGE && self.affine.is_some() && self.by_rule.is_none()
     }
 
     /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the

@@ -2,12 +2,10 @@
 
 use super::{Motion, SmoothField};
 use crate::error::FieldError;
+use crate::page::IS_PAGE;
 use crate::system::{
     move_inside, side_offsets, OwnSetting, PiecewiseSystem, RegionFields, Setting,
 };
-
-/// The page does without what is settled in a region: its module is to be small.
-const IS_SETTLED: bool = !cfg!(target_family = "wasm");
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 #[derive(Clone)]
@@ -35,7 +33,7 @@ impl<'a> RegionField<'a> {
     }
 
     fn settle(&mut self) {
-        if let Some((fields, values)) = self.settled.as_mut().filter(|_| IS_SETTLED) {
+        if let Some((fields, values)) = self.settled.as_mut().filter(|_| !IS_PAGE) {
             fields.settle(self.setting.get(), values);
         }
     }
@@ -82,7 +80,7 @@ impl SmoothField for RegionField<'_> {
         self.n_evaluations += 1;
         let place = self.setting.at(t, x);
         match &self.settled {
-            Some((fields, values)) if IS_SETTLED => fields.eval(&place, values, dx),
+            Some((fields, values)) if !IS_PAGE => fields.eval(&place, values, dx),
             _ => self.system.field(&place, dx)?,
         }
         if self.departing && dx.iter().any(|v| !v.is_finite()) {

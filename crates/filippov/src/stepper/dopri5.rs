@@ -4,6 +4,7 @@ use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E,
 use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, Run, SlidingField, SmoothField};
+use crate::page::IS_PAGE;
 use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
 
 /// Number of states where it is not fixed at compile time.
@@ -12,7 +13,7 @@ const ANY: usize = 0;
 /// The number of states for which loops are unrolled. A page gets one loop for all: its module is to be small, and fields that
 /// are interpreted take longer than the sums around them.
 const fn unrolled(n_states: usize) -> usize {
-    if cfg!(target_family = "wasm") {
+    if IS_PAGE {
         ANY
     } else {
         n_states

@@ -18,6 +18,7 @@ use super::reduction::{reduced, relative_degree};
 use super::region_fields::RegionProgram;
 use super::tiered::{compile, Tiered, TieredProgram};
 use super::Word;
+use crate::page::IS_PAGE;
 
 /// Graphs with more nodes are not kept to be compiled anew.
 const LARGEST_COPIED: usize = 500;
@@ -312,10 +313,10 @@ impl Model {
         made.program()
     }
 
-    /// The field in one region, where signs and parameters alone make much of it. The page does without: its module is to be small.
+    /// The field in one region, where signs and parameters alone make much of it.
     #[inline]
     pub fn region_program(&self) -> Option<&RegionProgram> {
-        if cfg!(target_family = "wasm") {
+        if IS_PAGE {
             return None;
         }
         let made = self

@@ -10,7 +10,7 @@ use super::{Place, Setting};
 /// Duties of an implementer: [`eval`](Self::eval), with the values that [`settle`](Self::settle) wrote for the same signs and discrete
 /// states, gives the bits of [`PiecewiseSystem::field`](super::PiecewiseSystem::field).
 pub trait RegionFields {
-    /// Writes what follows from signs and discrete states.
+    /// Computes the values that depend on the signs and the discrete states alone, and writes them to `values`.
     fn settle(&self, setting: Setting<'_>, values: &mut Vec<f64>);
 
     /// Writes f(t, x, s).

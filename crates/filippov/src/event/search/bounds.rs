@@ -11,6 +11,7 @@ use crate::event::tube::{RememberedTube, Tube};
 use crate::mode::Signs;
 use crate::motion::Monitored;
 use crate::motion::{AffineBounds, Guard, KnownMultipliers, RootEnd, Seen};
+use crate::page::IS_PAGE;
 use crate::stepper::Interpolant;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{EPS, MOST_ENCLOSED, ROOT_BOXES};
@@ -140,8 +141,7 @@ impl BoundedCurve<'_> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.sliding_system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
             let remembered;
-            // The page does without: its module is to be small.
-            let tube: &dyn Motion = match cfg!(target_family = "wasm") {
+            let tube: &dyn Motion = match IS_PAGE {
                 true => &tube,
                 false => {
                     remembered = RememberedTube::new(&tube, self.interpolant.n_states());
@@ -193,8 +193,7 @@ impl BoundedCurve<'_> {
 
 /// Do bounds of the multipliers that another guard has asked for show that one has no zero up to `reach`?
 pub(crate) fn is_known_clear(m: &Monitored, known: &[RootPiece], reach: f64) -> bool {
-    // The page asks the long way: its module is to be small.
-    if cfg!(target_family = "wasm") {
+    if IS_PAGE {
         return false;
     }
     let (Guard::Multiplier { end, .. }, Some((a, b, bounds))) = (m.guard, known.first()) else {

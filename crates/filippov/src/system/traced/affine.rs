@@ -4,6 +4,7 @@ use filippov_expr::{Enclosure, Motion};
 
 use super::TracedSystem;
 use crate::error::FieldError;
+use crate::page::IS_PAGE;
 use crate::system::{AffineParts, AffineSigns, Place, Setting, SignStructure};
 
 impl AffineSigns for TracedSystem {
@@ -42,8 +43,8 @@ impl AffineSigns for TracedSystem {
     }
 
     fn rate_moves(&self, j: usize, motion: &dyn Motion) -> bool {
-        if cfg!(target_family = "wasm") {
-            return true; // not asked
+        if IS_PAGE {
+            return true;
         }
         let model = self.model.affine_signs();
         model.read_by_rate(j).is_none_or(|states| {
