@@ -92,6 +92,15 @@ def test_rest_on_a_kink_that_motions_beside_it_cross() -> None:
     assert "stays on a surface" in lost.warnings[-1].message
 
 
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_rest_on_a_kink_that_motions_beside_it_cross_within_the_first_step() -> None:
+    """Where x0 < -0.01 x1 changes are damped ten times as fast; from below x0 = 0 they are there at once."""
+    system = fl.System(lambda t, x: [-x[1] - x[0], -np.maximum(x[0], -0.01 * x[1])], n=2)
+    sol = system.solve((0, 1), [0.0, 0.0], wrt="y0", rtol=1e-10, atol=1e-10)
+    assert np.isnan(sol.derivative()).all()
+    assert "stays on a surface" in sol.warnings[-1].message
+
+
 def test_an_entry_with_the_multiplier_at_its_end_beside_conditions_in_one_another() -> None:
     """At p = 1 the field above x = 0 vanishes there: for larger p motions leave, for smaller they slide."""
 

@@ -53,3 +53,38 @@ def test_jump_on_a_surface_that_the_motion_cannot_leave_is_not_blamed_on_the_fie
         assert [warning.code for warning in sol.warnings] == ["non_unique"]
     else:
         assert "x[0]" in sol.message
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Taylor", "Rodas5P"])
+@pytest.mark.parametrize(
+    ("power", "start"), [(3, [-0.774, 0.5]), (3, [0.0, 0.0]), (5, [0.0, 0.0]), (7, [0.0, 0.0])]
+)
+def test_rest_where_two_surfaces_touch_and_cross(power: int, start: list[float], method: str) -> None:
+    """At the origin x1 = 0 and x1 = 0.4 x0^3 have one normal, and all fields balance there.
+
+    A motion along the second surface comes to it with the speed 2.5. Both multipliers divide by zero there.
+    """
+
+    def field(t: float, x: Any) -> list[Any]:
+        upper, lower = np.sign(x[1]), np.heaviside(x[1] - 0.4 * x[0] ** power, 0.5)
+        return [-0.5 * x[0] - 1.76 * upper + 0.96 * lower, -0.7 * x[1] - 0.92 * upper - 1.27 * lower]
+
+    sol = fl.solve_ivp(field, (0.0, 2.0), start, method=method, rtol=1e-8, atol=1e-8)
+    assert sol.success, sol.message
+    np.testing.assert_allclose(sol.y[:, -1], 0.0, rtol=0, atol=1e-11)
+    assert str(sol.segments[-1].mode) == "0-"
+
+
+def test_the_extension_keeps_to_the_side_where_errors_are_larger_than_the_distance() -> None:
+    """A motion comes to rest at x = 0 from below, in steps at the limit of stability."""
+
+    def field(t: float, x: Any) -> list[Any]:
+        swing = np.where(x[0] > 0, 0.9 * np.cos(2.997 * t + x[0]), 1.1)
+        return [-0.695 * x[0] - 1.92 * swing * np.tanh(2.4 * x[0]) + 1.31 * (0.4 * x[0] + 0.7 * t < -0.3)]
+
+    for tolerance in (1e-3, 1e-4, 1e-5):
+        sol = fl.solve_ivp(field, (0.0, 5.0), [-1.4], method="DOPRI5", rtol=tolerance, atol=tolerance)
+        assert sol.success
+        for segment in sol.segments:
+            inside = np.linspace(segment.t_start, segment.t_end, 400)[:-1]
+            assert (sol.sol(inside)[0] * segment.mode[0] >= 0.0).all()

@@ -1,4 +1,5 @@
 //! The interactive page: its module is to be small, as a visitor loads it.
 
-/// Is this the module of the page? It does without what only makes long runs, and those of many surfaces, cheaper.
+/// Is this the module of the page? It does without what only makes long runs, and those of many surfaces or states,
+/// cheaper.
 pub(crate) const IS_PAGE: bool = cfg!(target_family = "wasm");

@@ -39,6 +39,9 @@ pub(super) enum Verdict {
     Viable(Viable),
     /// This guard begins negative.
     Fails(Guard),
+    /// The motion stays on this surface, and the field beyond presses it there: it is that of the mode that slides there too, with a
+    /// multiplier at its end.
+    Slides(usize, Viable),
     /// Derivatives at the point do not decide about this motion.
     Open(Next),
     /// Nor would a trial: the mode has no field at the point.
@@ -49,6 +52,8 @@ pub(super) enum Verdict {
 struct Outset {
     viable: Viable,
     failing: Option<Guard>,
+    /// A surface on which it stays, pressed by the field beyond.
+    slides: Option<usize>,
     is_open: bool,
 }
 
@@ -69,10 +74,11 @@ impl Outset {
     }
 
     fn verdict(self) -> Verdict {
-        match (self.failing, self.is_open) {
+        match (self.failing, self.slides) {
             (Some(guard), _) => Verdict::Fails(guard),
-            (None, true) => Verdict::Open(self.viable.next),
-            (None, false) => Verdict::Viable(self.viable),
+            (None, Some(j)) => Verdict::Slides(j, self.viable),
+            (None, None) if self.is_open => Verdict::Open(self.viable.next),
+            (None, None) => Verdict::Viable(self.viable),
         }
     }
 }
@@ -141,7 +147,7 @@ impl Candidate<'_> {
         for outset in outsets {
             match (outset?.verdict(), &found) {
                 (Verdict::Viable(viable), _) => return Ok(Verdict::Viable(viable)),
-                (Verdict::Fails(_), Verdict::Open(_)) => {}
+                (Verdict::Fails(_) | Verdict::Slides(..), Verdict::Open(_)) => {}
                 (verdict, _) => found = verdict,
             }
         }
@@ -157,6 +163,7 @@ impl Candidate<'_> {
         Outset {
             viable: Viable::strictly(next),
             failing: None,
+            slides: None,
             is_open: false,
         }
     }
@@ -214,13 +221,12 @@ impl Candidate<'_> {
                 continue;
             }
             let is_pressed = self.is_pressed(&place, i);
-            if lambda.is_empty() || self.is_neutral(i) {
+            let is_own = lambda.is_empty() || self.is_neutral(i);
+            if is_own || is_pressed {
                 outset.add(guard, side, germ);
                 outset.viable.is_pressed |= is_pressed;
                 outset.viable.next.left.push(Left::stays(j));
-            } else if is_pressed {
-                // It slides, with a multiplier at its end.
-                outset.failing = Some(guard);
+                outset.slides = outset.slides.or((!is_own).then_some(j));
             } else {
                 outset.is_open = true;
             }

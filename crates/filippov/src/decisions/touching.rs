@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{are_parallel, beside_on, in_the_place_of, normal};
 use crate::system::dot;
-use crate::tolerances::{DOUBTFUL, ONE_DIRECTION, ROUNDING};
+use crate::tolerances::{BESIDE, DOUBTFUL, ONE_DIRECTION, ROUNDING};
 
 /// Two surfaces, counted within a meeting, that touch one another: they have the same normal here, and are not in one place.
 pub(super) struct Touch {
@@ -121,6 +121,20 @@ pub(super) fn together(
     })
 }
 
+/// Does a velocity in this mode keep a motion on two surfaces that touch, where fields around them have this size?
+pub(super) fn keeps_together(
+    at: &Point,
+    pair: [usize; 2],
+    (mode, velocity): (&Mode, &[f64]),
+    size: f64,
+) -> Result<bool, FieldError> {
+    let (found, n) = (parting(at, pair, mode)?, velocity.len());
+    Ok(found.is_some_and(|(normal, _)| {
+        let rate = normal[n] + dot(&normal[..n], velocity);
+        rate.abs() <= DOUBTFUL * size
+    }))
+}
+
 /// Two surfaces that touch have functions that differ by a power of another one: its normal, along the surfaces, and whether
 /// the power is odd. `None` if what they differ by depends on where one looks beside the point.
 fn parting(
@@ -133,25 +147,33 @@ fn parting(
     let (one, other) = (one?, other?);
     let square = dot(&one, &one);
     let ratio = dot(&one, &other) / square;
-    let mut found: Vec<Vec<f64>> = Vec::new();
-    for side in [-1.0, 1.0] {
-        let (t, x) = beside_on(at.system, &at.place(&signs), j, side)?;
-        let (near, far) = (
-            normal(at.system, &at.place_at(t, &x, &signs), j)?,
-            normal(at.system, &at.place_at(t, &x, &signs), k)?,
-        );
-        let pairs = far.iter().zip(&near);
-        let mut row: Vec<f64> = pairs.map(|(far, near)| far - ratio * near).collect();
-        // Along the surfaces.
-        let along = dot(&row, &one) / square;
-        row.iter_mut()
-            .zip(&one)
-            .for_each(|(row, one)| *row -= along * one);
-        let size = dot(&row, &row).sqrt();
-        row.iter_mut().for_each(|v| *v /= size);
-        found.push(row);
+    // Of a high power nothing but rounding is seen near the point.
+    for distance in BESIDE {
+        let mut found: Vec<Vec<f64>> = Vec::new();
+        for side in [-1.0, 1.0] {
+            let (t, x) = beside_on(at.system, &at.place(&signs), j, side * distance)?;
+            let (near, far) = (
+                normal(at.system, &at.place_at(t, &x, &signs), j)?,
+                normal(at.system, &at.place_at(t, &x, &signs), k)?,
+            );
+            let pairs = far.iter().zip(&near);
+            let mut row: Vec<f64> = pairs.map(|(far, near)| far - ratio * near).collect();
+            // Along the surfaces.
+            let along = dot(&row, &one) / square;
+            row.iter_mut()
+                .zip(&one)
+                .for_each(|(row, one)| *row -= along * one);
+            let size = dot(&row, &row).sqrt();
+            if size > ROUNDING * dot(&other, &other).sqrt() {
+                row.iter_mut().for_each(|v| *v /= size);
+                found.push(row);
+            }
+        }
+        if let [before, later] = &found[..] {
+            let product = dot(before, later);
+            let is_one = product.abs() >= 1.0 - ONE_DIRECTION;
+            return Ok(is_one.then(|| (found.swap_remove(1), product > 0.0)));
+        }
     }
-    let product = dot(&found[0], &found[1]);
-    let is_one = product.abs() >= 1.0 - ONE_DIRECTION;
-    Ok(is_one.then(|| (found.swap_remove(1), product > 0.0)))
+    Ok(None)
 }

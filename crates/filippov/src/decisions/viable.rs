@@ -5,7 +5,7 @@ use super::consistency::{consistency, Consistency};
 use super::point::{Cause, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
 use super::surroundings::Surroundings;
-use super::touching::{together, Parallels, Together, Touch};
+use super::touching::{keeps_together, together, Parallels, Together, Touch};
 use super::trial::{try_mode, Trial};
 
 use crate::error::{FieldError, Undecided};
@@ -60,6 +60,7 @@ pub(super) fn survey(
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
     let mut found = Survey::default();
+    let mut pressed = Vec::new();
     for index in 0..3_usize.pow(m as u32) {
         let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
         if at.patience.is_over() {
@@ -137,6 +138,7 @@ pub(super) fn survey(
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
+            Verdict::Slides(j, viable) => pressed.push((j, viable)),
             Verdict::Untold => found.open.push(mode),
             Verdict::Open(next) => match try_mode(at, notes, &next, meeting.surfaces, ROUNDING)? {
                 Trial::Leaves(left) => {
@@ -146,6 +148,26 @@ pub(super) fn survey(
                 Trial::WithinRounding if is_beside => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
+        }
+    }
+    for (j, viable) in pressed {
+        // Where the surfaces touch, the equations of both multipliers are singular, and the motion has the name of the side.
+        let mode = &viable.next.mode;
+        let slides = mode.with(j, 0);
+        let mut is_singular = false;
+        for touch in &touching {
+            let pair = touch.pair.map(|i| meeting.surfaces[i]);
+            if pair.contains(&j) && pair.iter().all(|&k| slides.entries()[k] == 0) {
+                let velocity = at.velocity_from(notes, mode, viable.next.start.as_deref())?;
+                is_singular |= keeps_together(at, pair, (mode, &velocity), corners.size())?;
+            }
+        }
+        if is_singular {
+            found.open.retain(|mode| *mode != slides);
+            found.viable.retain(|other| other.next.mode != slides);
+            found.viable.push(viable);
+        } else {
+            found.failing.push((viable.next.mode, Guard::Surface(j)));
         }
     }
     Ok(Some(found))

@@ -178,21 +178,36 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Surfaces on which a run is, with columns of which nothing is known yet.
-    pub fn all(surfaces: &[usize], n_columns: usize, has_sides: bool) -> Vec<Kept> {
-        let own = surfaces.iter().map(|&surface| Kept {
-            surface,
-            sides: vec![0.0; n_columns],
-            has_sides,
-        });
-        own.collect()
+    /// Surfaces on which a run is at a place, with the sides to which these columns lead there.
+    pub fn all(
+        surfaces: &[usize],
+        has_sides: bool,
+        piece: &Piece,
+        at: (f64, &[f64]),
+        columns: &[Vec<f64>],
+    ) -> Result<Vec<Kept>, FieldError> {
+        let mut all = Vec::with_capacity(surfaces.len());
+        for &surface in surfaces {
+            let sides = vec![0.0; columns.len()];
+            let mut kept = Kept {
+                surface,
+                sides,
+                has_sides,
+            };
+            kept.is_crossed(piece, at, columns)?;
+            all.push(kept);
+        }
+        Ok(all)
     }
 
     /// Quiet surfaces on which a run is, with one column that came to each of them.
     pub fn moved_off(surfaces: &[usize]) -> Vec<Kept> {
-        let mut all = Kept::all(surfaces, 1, false);
-        all.iter_mut().for_each(|one| one.sides.fill(1.0));
-        all
+        let own = surfaces.iter().map(|&surface| Kept {
+            surface,
+            sides: vec![1.0],
+            has_sides: false,
+        });
+        own.collect()
     }
 
     /// The surface, if its sides differ from here on for one of the columns.

@@ -22,6 +22,9 @@ use crate::vectors::dot;
 /// So many motions are kept, in case that they come again.
 const MOST_PIECES: usize = 16;
 
+/// Where inside of a part of a step the motion is looked at: a fraction that no symmetry singles out.
+const INSIDE: f64 = 0.37;
+
 /// The derivatives of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Derivatives {
@@ -221,8 +224,8 @@ impl<'a> Tangents<'a> {
             }
         }
         let borders = &mut self.found.borders;
-        self.kept_on = Kept::all(&starts_on, self.kinds.len(), true);
-        let quiet = Kept::all(&stays_on, self.kinds.len(), false);
+        self.kept_on = Kept::all(&starts_on, true, &piece, (t, &z), &self.columns)?;
+        let quiet = Kept::all(&stays_on, false, &piece, (t, &z), &self.columns)?;
         self.kept_on.extend(quiet);
         borders.starts_at_end = starts_at_end(&mut piece, (t, &z), &starts_on, &self.columns)?;
         borders.starts_on = starts_on;
@@ -352,7 +355,7 @@ impl<'a> Tangents<'a> {
                 let z = extended.state(&extended.with_named(x_end, step.discrete));
                 piece.project(t1, &z, &mut self.columns)?;
             }
-            let is_crossed = self.crosses_kept(&piece, t1, x_end)?;
+            let is_crossed = self.crosses_kept(&piece, step, (t0, t1), x_end)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(t1, Lost::NotFinite);
@@ -365,15 +368,25 @@ impl<'a> Tangents<'a> {
         Ok(())
     }
 
-    /// Does a run beside this one cross a surface on which this one stays?
-    fn crosses_kept(&mut self, piece: &Piece, t: f64, x: &[f64]) -> Result<bool, FieldError> {
+    /// Does a run beside this one cross, in a part of a step, a surface on which this one stays?
+    fn crosses_kept(
+        &mut self,
+        piece: &Piece,
+        step: &ObservedStep,
+        (t0, t): (f64, f64),
+        x: &[f64],
+    ) -> Result<bool, FieldError> {
         if self.kept_on.is_empty() {
             return Ok(false);
         }
-        let z = self.around.extended.state(x);
+        // A motion that leaves a surface may come back to it at the end.
+        let (between, extended) = (t0 + INSIDE * (t - t0), self.around.extended);
+        let mut inside = vec![0.0; extended.n];
+        extended.write_with_named(&mut inside, step.discrete, |x| step.at(between, x));
+        let [inside, z] = [&inside[..], x].map(|x| extended.state(x));
         let (mut kept_on, mut is_crossed) = (Vec::new(), false);
         for mut kept in std::mem::take(&mut self.kept_on) {
-            if kept.holds(piece, t, &z)? {
+            if kept.holds(piece, between, &inside)? && kept.holds(piece, t, &z)? {
                 is_crossed |= kept.is_crossed(piece, (t, &z), &self.columns)?;
                 let differs = kept.begins_to_differ(piece, (t, &z))?;
                 self.found.borders.starts_on.extend(differs);
@@ -442,7 +455,9 @@ impl<'a> Tangents<'a> {
                 let arrives = all.iter().any(|found| found.arrives);
                 let columns = &self.columns;
                 let landed = surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
-                self.kept_on.extend(Kept::all(&landed, columns.len(), true));
+                let z = self.around.extended.state(record.x[1]);
+                let kept = Kept::all(&landed, true, &after, (record.t[1], &z), columns)?;
+                self.kept_on.extend(kept);
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
             }

@@ -9,14 +9,24 @@ use crate::tolerances::{REMAINDER, STAGE_SPREAD};
 /// as at most a fixed part of their spread ([`REMAINDER`]). `g0 > 0` is the side of the mode.
 #[inline]
 pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
-    let b1 = g0 + slope0 / 3.0;
-    let b2 = g1 - slope1 / 3.0;
+    let [b1, b2] = between_ends(g0, slope0, g1, slope1);
     let low = g0.min(g1).min(b1).min(b2);
     let high = g0.max(g1).max(b1).max(b2);
     let remainder = REMAINDER * (high - low);
     // Written so that a NaN asks for the search.
     let excluded = low > remainder && (g0 + slope0 + g1 + slope1).is_finite();
     !(excluded || stays_positive([g0, b1, b2, g1], remainder))
+}
+
+/// The least Bernstein coefficient of the cubic: that is nowhere less.
+pub fn least_of_cubic(g0: f64, slope0: f64, g1: f64, slope1: f64) -> f64 {
+    let [b1, b2] = between_ends(g0, slope0, g1, slope1);
+    g0.min(g1).min(b1).min(b2)
+}
+
+/// The inner Bernstein coefficients of the cubic.
+fn between_ends(g0: f64, slope0: f64, g1: f64, slope1: f64) -> [f64; 2] {
+    [g0 + slope0 / 3.0, g1 - slope1 / 3.0]
 }
 
 /// Is a function positive whose distance to the cubic with these Bernstein coefficients is at most

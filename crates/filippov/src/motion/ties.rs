@@ -102,25 +102,34 @@ pub fn in_the_place_of(
     j: usize,
     others: &[usize],
 ) -> Result<Vec<usize>, FieldError> {
-    // Beside the place, so that surfaces that only touch are told apart.
-    let (later, beside) = beside_on(system, place, j, 1.0)?;
-    let moved = place.moved(later, &beside);
     let mut h = [(); 2].map(|()| vec![0.0; place.signs.len()]);
-    system.surfaces(&moved, &mut h[0])?;
     system.surfaces(place, &mut h[1])?;
-    let (mut found, mut gradient) = (Vec::new(), vec![0.0; beside.len()]);
-    for &k in others {
-        let rate = system.gradient(k, &moved, &mut gradient)?;
-        let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
-        // One with a multiple zero has no gradient there.
-        if h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size {
-            found.push(k);
+    let (mut found, mut gradient) = (others.to_vec(), vec![0.0; place.x.len()]);
+    // Beside the place, so that surfaces that only touch are told apart.
+    for distance in BESIDE {
+        let (later, beside) = beside_on(system, place, j, distance)?;
+        let moved = place.moved(later, &beside);
+        system.surfaces(&moved, &mut h[0])?;
+        let is_on = h[0][j].abs() <= ROUNDING * system.surface_size(j, &moved)?;
+        // Far away there may be no place on the surface.
+        if distance > BESIDE[0] && !is_on {
+            break;
         }
+        let mut vanishing = Vec::with_capacity(found.len());
+        for k in found {
+            let rate = system.gradient(k, &moved, &mut gradient)?;
+            let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
+            // One with a multiple zero has no gradient there.
+            if h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size {
+                vanishing.push(k);
+            }
+        }
+        found = vanishing;
     }
     Ok(found)
 }
 
-/// A place beside this one on surface j, a little later if `side` is +1, and before if it is -1.
+/// A place on surface j at this distance beside this one, later if it is positive, and before if it is negative.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -128,11 +137,11 @@ pub fn beside_on(
     system: &dyn PiecewiseSystem,
     place: &Place<'_>,
     j: usize,
-    side: f64,
+    distance: f64,
 ) -> Result<(f64, Vec<f64>), FieldError> {
-    let &Place { t, x, signs, .. } = place;
-    let later = t + side * BESIDE * (1.0 + t.abs());
-    let shifts = (0..x.len()).map(|i| side * BESIDE * (1.0 + side / (2.0 + i as f64)));
+    let (&Place { t, x, signs, .. }, side) = (place, distance.signum());
+    let later = t + distance * (1.0 + t.abs());
+    let shifts = (0..x.len()).map(|i| distance * (1.0 + side / (2.0 + i as f64)));
     let pairs = x.iter().zip(shifts);
     let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
     let mut projector = Projector::new(beside.len(), signs.len());

@@ -3,6 +3,7 @@
 use super::order::{components, Component};
 use super::rows::SparseRows;
 use super::solver::{Singular, SparseSolver};
+use crate::page::IS_PAGE;
 use crate::tolerances::{BORDER_ACCURACY, BORDER_GAIN, COUPLED_WITH_MANY, MOST_BORDERED};
 
 /// How often the matrix of a step is used: what the border costs per solution counts that many times.
@@ -76,8 +77,8 @@ impl BorderedSolver {
     /// [`Singular`] if a pivot is zero.
     pub fn factor(&mut self, matrix: &SparseRows) -> Result<(), Singular> {
         self.is_bordered = match &mut self.border {
-            Some(border) => border.factor(matrix),
-            None => false,
+            Some(border) if !IS_PAGE => border.factor(matrix),
+            _ => false,
         };
         match self.is_bordered {
             true => Ok(()),
@@ -88,7 +89,7 @@ impl BorderedSolver {
     /// Solves in place with the matrix factored last.
     pub fn solve(&mut self, x: &mut [f64]) {
         match &mut self.border {
-            Some(border) if self.is_bordered => border.solve(x),
+            Some(border) if self.is_bordered && !IS_PAGE => border.solve(x),
             _ => self.whole.solve(x),
         }
     }
@@ -119,6 +120,9 @@ struct Border {
 impl Border {
     /// The border of a pattern, if it has one that saves much.
     fn of(matrix: &SparseRows) -> Option<Border> {
+        if IS_PAGE {
+            return None;
+        }
         let n = matrix.n_rows();
         let mut degrees = vec![0_usize; n];
         for i in 0..n {

@@ -189,8 +189,9 @@ pub const AT_FOLD: f64 = 1e-2;
 /// they have changed by as much as rounding of the state changes the quotients, by about the root of rounding.
 pub const HELD_AFTER: f64 = 1e-8;
 
-/// Distance, in units of 1 plus the size of a component, at which two surfaces are compared: its square is far above rounding.
-pub const BESIDE: f64 = 1e-3;
+/// Distances, in units of 1 plus the size of a component, at which two surfaces are compared: the square of the first is far above
+/// rounding, and the ninth power of the second.
+pub const BESIDE: [f64; 2] = [1e-3, 3e-2];
 
 /// Surfaces that touch part in one direction if two places beside the point show the same to this, far above [`BESIDE`].
 pub const ONE_DIRECTION: f64 = 1e-2;

@@ -10,7 +10,7 @@ use super::sought::{AtZero, Search, Sought};
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};
-use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
+use crate::event::filter::{least_of_cubic, may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{Event, Found};
@@ -192,7 +192,10 @@ impl StepSearch<'_, '_> {
         };
         let may_vanish = match (m.surface(), m.deflation) {
             _ if proof != Proof::Silent => proof == Proof::Open,
-            (Some(_), None) if m.affine => may_vanish(m.value, m.rate * dt, value, rate * dt),
+            (Some(j), None) if m.affine => {
+                may_vanish(m.value, m.rate * dt, value, rate * dt)
+                    || self.is_within_tolerance(j, dt, (&m, value, rate))?
+            }
             (Some(j), None) => {
                 self.probe_surfaces(dt)?;
                 let at = &self.detector.probed;
@@ -212,6 +215,21 @@ impl StepSearch<'_, '_> {
         };
         sought.dismissed |= !may_vanish && proof == Proof::Silent && self.run.motion.ends_root(&m);
         Ok(may_vanish.then_some(proof))
+    }
+
+    /// Does an affine function come to zero within what the step may err by? There its extension is errors of the stages, which
+    /// values and slopes at the ends do not show.
+    fn is_within_tolerance(
+        &mut self,
+        j: usize,
+        dt: f64,
+        (m, value, rate): (&Monitored, f64, f64),
+    ) -> Result<bool, FieldError> {
+        let least = least_of_cubic(m.value, m.rate * dt, value, rate * dt);
+        let (run, gradient) = (&*self.run, &mut self.detector.gradient);
+        let place = run.motion.setting().at(run.t, &run.x);
+        run.system.gradient(j, &place, gradient)?;
+        Ok(least <= run.scale.along(gradient, &run.x))
     }
 
     /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
