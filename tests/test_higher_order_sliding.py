@@ -332,6 +332,24 @@ def test_rocking_block_stays_until_its_base_is_shaken_hard_enough() -> None:
     assert moved.switches[0].t == pytest.approx(math.asin(4 * math.sin(0.25) / 1.6) / 5, abs=1e-9)
 
 
+@pytest.mark.parametrize("how", ["tick", "reset"])
+def test_what_changes_the_rate_moves_a_body_that_rests(how: str) -> None:
+    """From 0.7 on the rate of x0 is 0.53, and falls by 0.7 per unit of time: x0 = 0.53 s - 0.35 s^2."""
+
+    def pushed(t: float, x: Any) -> list[Any]:
+        push = 0.53 * np.floor(t / 0.7) if how == "tick" else 0.0
+        return [x[1] + push, 0.3 - np.sign(x[0])]
+
+    kick = [fl.Reset(times=[0.7], map=lambda t, x: [x[0], 0.53])] if how == "reset" else []
+    sol = fl.solve_ivp(pushed, (0.0, 1.2), [0.0, 0.0], resets=kick)
+    assert sol.success
+    (change,) = sol.switches
+    assert str(change.mode_after) == "+"
+    np.testing.assert_array_equal(change.y_after, [0.0, 0.53 if how == "reset" else 0.0])
+    speed = 0.53 if how == "reset" else 0.0
+    np.testing.assert_allclose(sol.y[:, -1], [0.53 * 0.5 - 0.35 * 0.25, speed - 0.35], atol=1e-9)
+
+
 def test_nothing_rests_that_is_only_small() -> None:
     """Small, slow and unstable motions are followed, whatever the tolerance."""
     slow = fl.solve_ivp(lambda t, x: [1e-12 + 0 * np.sign(x[0])], (0, 10), [0.0])

@@ -10,7 +10,7 @@ use crate::mode::Mode;
 use crate::motion::{Leading, Level, Projector};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::{BothSides, PiecewiseSystem, Place};
-use crate::tolerances::{DOUBTFUL, ROUNDING};
+use crate::tolerances::{DOUBTFUL, ERRORS_OF_STEPS, ROUNDING};
 
 /// Does a reduced system jump at a point of a surface, or is its rate reduced once more?
 fn jumps(system: &dyn PiecewiseSystem, j: usize, place: &Place<'_>) -> Result<bool, FieldError> {
@@ -60,7 +60,7 @@ impl<'a> Reduced<'a> {
             orders: vec![0; signs.len()],
         };
         let mut projector = Projector::new(at.x.len(), signs.len());
-        let mut h = vec![0.0; signs.len()];
+        let (mut h, mut gradient) = (vec![0.0; signs.len()], vec![0.0; at.x.len()]);
         let mut order = 0;
         let mut levels: SmallVec<[(&dyn PiecewiseSystem, Vec<usize>); 3]> = SmallVec::new();
         while let Some(next) = left.system.reduced(&left.surfaces) {
@@ -84,7 +84,13 @@ impl<'a> Reduced<'a> {
                 if !value.is_finite() {
                     return Ok(None);
                 }
-                let is_kept = at.arrival.sliding.contains(&j);
+                // Sliding keeps the rate to errors of steps. What acts on the motion may have changed it.
+                let mut is_kept = at.arrival.sliding.contains(&j);
+                if is_kept && value.abs() > noise {
+                    next.gradient(j, &place, &mut gradient)?;
+                    let error = at.scale.along(&gradient, &left.x);
+                    is_kept = value.abs() <= ERRORS_OF_STEPS * error;
+                }
                 if value.abs() <= noise && !jumps(next, j, &place)? {
                     return Ok(None);
                 }
