@@ -1,4 +1,4 @@
-//! Native code by Cranelift. The only file with `unsafe`: calling the code, and freeing it.
+//! Native code by Cranelift. The only file of the crate with `unsafe`: calling the code, and freeing it.
 //!
 //! One function per program, generic in the signs, with the C signature of [`CompiledFunction`]; a large program is a
 //! chain of such functions, which hand values on in a buffer. What is

@@ -24,20 +24,24 @@ impl ErrorScale {
     /// The scale of component `i`; infinite where it does not count.
     #[inline]
     pub fn of(&self, i: usize, y0: f64, y1: f64) -> f64 {
-        let tolerance = self.tolerance(i, y0, y1);
-        if tolerance == f64::MIN_POSITIVE {
-            f64::INFINITY
-        } else {
-            tolerance
-        }
+        scale(self.tolerance(i, y0, y1))
+    }
+
+    /// The absolute tolerances.
+    pub(crate) fn atol(&self) -> &[f64] {
+        &self.atol
+    }
+
+    /// The scale of a component with this absolute tolerance.
+    #[inline(always)]
+    pub(crate) fn by(&self, atol: f64, y0: f64, y1: f64) -> f64 {
+        scale(tolerance(atol, self.rtol, y0, y1))
     }
 
     /// What component `i` may err by.
     #[inline]
     pub fn tolerance(&self, i: usize, y0: f64, y1: f64) -> f64 {
-        // Not `f64::max`: a NaN must survive, and one comparison is cheaper.
-        let (a, b) = (y0.abs(), y1.abs());
-        self.atol[i] + self.rtol * if b < a { a } else { b }
+        tolerance(self.atol[i], self.rtol, y0, y1)
     }
 
     /// The size of component `i` at `y` is its magnitude. Where the magnitude is small, the size is the value below which the
@@ -64,6 +68,23 @@ impl ErrorScale {
     /// Root mean square of `v` in units of the scale at `y`.
     pub fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
         root_mean_square(v.len(), |i| v[i] / self.of(i, y[i], y[i]))
+    }
+}
+
+#[inline(always)]
+fn tolerance(atol: f64, rtol: f64, y0: f64, y1: f64) -> f64 {
+    // Not `f64::max`: a NaN must survive, and one comparison is cheaper.
+    let (a, b) = (y0.abs(), y1.abs());
+    atol + rtol * if b < a { a } else { b }
+}
+
+/// What an error of this tolerance is measured in.
+#[inline(always)]
+fn scale(tolerance: f64) -> f64 {
+    if tolerance == f64::MIN_POSITIVE {
+        f64::INFINITY
+    } else {
+        tolerance
     }
 }
 

@@ -1,14 +1,12 @@
 //! DOPRI5(4): one step, its error estimate and its continuous extensions.
 
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E, STABILITY_END};
+use super::lanes::{self, ANY};
 use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, Run, SlidingField, SmoothField};
 use crate::page::IS_PAGE;
 use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
-
-/// Number of states where it is not fixed at compile time.
-const ANY: usize = 0;
 
 /// The number of states for which loops are unrolled. A page gets one loop for all: its module is to be small, and fields that
 /// are interpreted take longer than the sums around them.
@@ -122,56 +120,32 @@ impl Dopri5 {
         let (k2, k3, k4) = (&mut k2[..n], &mut k3[..n], &mut k4[..n]);
         let (k5, k6) = (&mut k5[..n], &mut k6[..n]);
 
-        for i in 0..n {
-            stage[i] = y[i] + dt * (A2[0] * k1[i]);
-        }
+        lanes::stage::<N, 1>(stage, y, dt, A2, [k1]);
         field.eval(t + C[1] * dt, stage, k2)?;
         observe(field);
-        for i in 0..n {
-            stage[i] = y[i] + dt * (A3[0] * k1[i] + A3[1] * k2[i]);
-        }
+        lanes::stage::<N, 2>(stage, y, dt, A3, [k1, k2]);
         field.eval(t + C[2] * dt, stage, k3)?;
         observe(field);
-        for i in 0..n {
-            stage[i] = y[i] + dt * (A4[0] * k1[i] + A4[1] * k2[i] + A4[2] * k3[i]);
-        }
+        lanes::stage::<N, 3>(stage, y, dt, A4, [k1, k2, k3]);
         field.eval(t + C[3] * dt, stage, k4)?;
         observe(field);
-        for i in 0..n {
-            stage[i] = y[i] + dt * (A5[0] * k1[i] + A5[1] * k2[i] + A5[2] * k3[i] + A5[3] * k4[i]);
-        }
+        lanes::stage::<N, 4>(stage, y, dt, A5, [k1, k2, k3, k4]);
         field.eval(t + C[4] * dt, stage, k5)?;
         observe(field);
-        for i in 0..n {
-            stage[i] = y[i]
-                + dt * (A6[0] * k1[i]
-                    + A6[1] * k2[i]
-                    + A6[2] * k3[i]
-                    + A6[3] * k4[i]
-                    + A6[4] * k5[i]);
-        }
+        lanes::stage::<N, 5>(stage, y, dt, A6, [k1, k2, k3, k4, k5]);
         field.eval(t + dt, stage, k6)?;
         observe(field);
-        for i in 0..n {
-            y1[i] = y[i]
-                + dt * (B[0] * k1[i] + B[2] * k3[i] + B[3] * k4[i] + B[4] * k5[i] + B[5] * k6[i]);
-        }
+        // The second stage has no weight.
+        let weights = [B[0], B[2], B[3], B[4], B[5]];
+        lanes::stage::<N, 5>(y1, y, dt, weights, [k1, k3, k4, k5, k6]);
         field.eval(t + dt, y1, k7)?;
         observe(field);
 
-        let mut sum = 0.0;
-        for i in 0..n {
-            let e = E[0] * k1[i]
-                + E[2] * k3[i]
-                + E[3] * k4[i]
-                + E[4] * k5[i]
-                + E[5] * k6[i]
-                + E[6] * k7[i];
-            let ratio = dt * e / scale.of(i, y[i], y1[i]);
-            sum += ratio * ratio;
-        }
+        let weights = [E[0], E[2], E[3], E[4], E[5], E[6]];
+        let rates = [k1, k3, k4, k5, k6, k7];
+        let sum = lanes::squared_error::<N, 6>(scale, [y, y1], dt, weights, rates);
         let error = (sum / n as f64).sqrt();
-        // The second stage enters neither the weights nor the estimate: look at it separately.
+        // The second stage is not in the estimate: look at it separately.
         let finite = error.is_finite() && k2.iter().all(|v| v.is_finite());
         Ok(if finite {
             Attempt::Error(error)

@@ -17,6 +17,7 @@ mod dop853;
 mod dopri5;
 mod duties;
 mod initial_step;
+mod lanes;
 mod midpoint;
 mod pace;
 mod rodas5p;

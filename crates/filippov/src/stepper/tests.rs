@@ -1,6 +1,7 @@
 //! Order conditions of DOPRI5 and of its continuous extensions; those of the other methods in their own files.
 
 mod dop853;
+mod lanes;
 mod rodas5p;
 mod trees;
 
