@@ -174,12 +174,10 @@ fn limit_of_flights(at: &Point, flights: usize) -> Result<Option<Limit>, FieldEr
         Ok(h[j].abs())
     };
     let rates = [rate(second)?, rate(third)?, rate(last)?];
-    let mut gradient = vec![0.0; at.x.len()];
-    at.system
-        .gradient(j, &at.place(at.arrival.signs), &mut gradient)?;
     // How far the next flight leads from the surface.
     let height = rates[2] * c * s;
-    let is_unresolved = height <= at.scale.along(&gradient, at.x);
+    let place = at.place(at.arrival.signs);
+    let is_unresolved = height <= at.system.tolerance(j, &place, at.scale)?;
     if !is_unresolved || rates[1] >= rates[0] || rates[2] >= rates[1] {
         return Ok(None);
     }

@@ -166,9 +166,7 @@ fn slipped_through(
     if !came_from || h * f64::from(side) >= 0.0 {
         return Ok(None);
     }
-    let mut gradient = vec![0.0; at.x.len()];
-    at.system.gradient(j, &at.place(signs), &mut gradient)?;
-    let tolerance = at.scale.along(&gradient, at.x);
+    let tolerance = at.system.tolerance(j, &at.place(signs), at.scale)?;
     let is_near = h.abs() <= ERRORS_OF_STEPS * tolerance;
     Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
 }

@@ -60,7 +60,7 @@ impl<'a> Reduced<'a> {
             orders: vec![0; signs.len()],
         };
         let mut projector = Projector::new(at.x.len(), signs.len());
-        let (mut h, mut gradient) = (vec![0.0; signs.len()], vec![0.0; at.x.len()]);
+        let mut h = vec![0.0; signs.len()];
         let mut order = 0;
         let mut levels: SmallVec<[(&dyn PiecewiseSystem, Vec<usize>); 3]> = SmallVec::new();
         while let Some(next) = left.system.reduced(&left.surfaces) {
@@ -87,8 +87,7 @@ impl<'a> Reduced<'a> {
                 // Sliding keeps the rate to errors of steps. What acts on the motion may have changed it.
                 let mut is_kept = at.arrival.sliding.contains(&j);
                 if is_kept && value.abs() > noise {
-                    next.gradient(j, &place, &mut gradient)?;
-                    let error = at.scale.along(&gradient, &left.x);
+                    let error = next.tolerance(j, &place, at.scale)?;
                     is_kept = value.abs() <= ERRORS_OF_STEPS * error;
                 }
                 if value.abs() <= noise && !jumps(next, j, &place)? {

@@ -53,10 +53,8 @@ pub(crate) fn warn_zero_surface(at: &Point, notes: &mut Notes, j: usize, mode: &
 pub(crate) fn has_left_zero_surface(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
     let signs = at.arrival.signs;
     let h = at.surface_values(notes, signs)?;
-    let mut gradient = vec![0.0; at.x.len()];
     for &j in at.arrival.resting {
-        at.system.gradient(j, &at.place(signs), &mut gradient)?;
-        let tolerance = at.scale.along(&gradient, at.x);
+        let tolerance = at.system.tolerance(j, &at.place(signs), at.scale)?;
         // Bodies that touch have to be held apart at once.
         let factor = match at.triggers().is_only_trigger(j) {
             true => 1.0,

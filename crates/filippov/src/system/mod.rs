@@ -67,6 +67,7 @@ pub(crate) use tiered::Tiered;
 pub use traced::TracedSystem;
 
 use crate::error::FieldError;
+use crate::error_scale::ErrorScale;
 use crate::tolerances::EPS;
 
 /// A piecewise-smooth system.
@@ -197,6 +198,21 @@ pub trait PiecewiseSystem: SignStructure + Sync {
             *product = dot(&gradient, vector);
         }
         Ok(ht)
+    }
+
+    /// How far h_j may be off where each component of the state is off by its tolerance.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn tolerance(
+        &self,
+        j: usize,
+        place: &Place<'_>,
+        scale: &ErrorScale,
+    ) -> Result<f64, FieldError> {
+        let mut gradient = vec![0.0; place.x.len()];
+        self.gradient(j, place, &mut gradient)?;
+        Ok(scale.along(&gradient, place.x))
     }
 
     /// The size of the terms that h_j is made of at a point, sum |d_i h_j x_i| + |d_t h_j t|, and where it is known

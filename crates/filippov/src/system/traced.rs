@@ -20,6 +20,7 @@ use super::{
     TaylorSeries, Word,
 };
 use crate::error::FieldError;
+use crate::error_scale::ErrorScale;
 use crate::system::Linearisation;
 use crate::tolerances::{MAX_LIE_ORDER, ROUNDING, TANGENT};
 
@@ -373,6 +374,19 @@ impl PiecewiseSystem for TracedSystem {
                 *product = entries.map(|(&i, value)| value * vector[i]).sum();
             }
             time
+        }))
+    }
+
+    fn tolerance(
+        &self,
+        j: usize,
+        place: &Place<'_>,
+        scale: &ErrorScale,
+    ) -> Result<f64, FieldError> {
+        Ok(self.with_gradient(j, place, |_, states, values| {
+            let own = |&i: &usize| scale.tolerance(i, place.x[i], place.x[i]);
+            let entries = states.iter().zip(values);
+            entries.map(|(i, value)| value.abs() * own(i)).sum()
         }))
     }
 

@@ -26,7 +26,6 @@ pub(crate) struct Detector {
     pub(super) is_probed: bool,
     pub(super) rate: Vec<f64>,
     pub x: Vec<f64>,
-    pub(super) gradient: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
     pub margin: Vec<f64>,
     /// Bounds of the normal components over pieces of the extension of this step.
@@ -48,7 +47,6 @@ impl Detector {
             is_probed: false,
             rate: vec![0.0; d],
             x: vec![0.0; n],
-            gradient: vec![0.0; n],
             margin: Vec::new(),
             enclosed_exits: RefCell::default(),
             enclosed_roots: RefCell::default(),

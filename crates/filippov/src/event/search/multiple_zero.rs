@@ -297,13 +297,10 @@ impl StepSearch<'_, '_> {
             return Ok(0.0);
         }
         let mut x = vec![0.0; self.run.x.len()];
-        let mut gradient = x.clone();
         self.stepper.interpolant().at(theta, &mut x);
         let t = self.run.t + theta * self.stepper.interpolant().dt;
-        self.run
-            .system
-            .gradient(j, &self.run.motion.setting().at(t, &x), &mut gradient)?;
-        let tolerance = self.run.scale.along(&gradient, &x);
+        let place = self.run.motion.setting().at(t, &x);
+        let tolerance = self.run.system.tolerance(j, &place, &self.run.scale)?;
         Ok(TOUCH_DEPTH * tolerance)
     }
 

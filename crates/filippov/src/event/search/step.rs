@@ -226,10 +226,9 @@ impl StepSearch<'_, '_> {
         (m, value, rate): (&Monitored, f64, f64),
     ) -> Result<bool, FieldError> {
         let least = least_of_cubic(m.value, m.rate * dt, value, rate * dt);
-        let (run, gradient) = (&*self.run, &mut self.detector.gradient);
+        let run = &*self.run;
         let place = run.motion.setting().at(run.t, &run.x);
-        run.system.gradient(j, &place, gradient)?;
-        Ok(least <= run.scale.along(gradient, &run.x))
+        Ok(least <= run.system.tolerance(j, &place, &run.scale)?)
     }
 
     /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
