@@ -69,3 +69,19 @@ def test_switches_accumulate_where_a_kink_is_in_the_place_of_a_surface(method: s
     np.testing.assert_allclose(sol.sol(last.t, side="left"), last.y_before, rtol=0, atol=1e-15)
     np.testing.assert_allclose(sol.y[:, -1], [0.0, -0.4], rtol=0, atol=1e-15)
     assert str(last.mode_after) == "000"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_surfaces_in_one_place_of_which_one_ends_nearby(method: str) -> None:
+    """y = 0 and y + sin(y) sqrt(1 - x^2) = 0 are in one place; beyond x = 1 the second has no value."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        other = x[1] + np.sin(x[1]) * np.sqrt(1.0 - x[0] ** 2)
+        return [-0.1, 0.2 - np.sign(x[1]) - 0.5 * np.sign(other)]
+
+    sol = fl.solve_ivp(fun, (0.0, 1.0), [0.98, 0.3], method=method, rtol=1e-9, atol=1e-9)
+    assert sol.success, sol.message
+    (enter,) = sol.switches
+    assert (enter.kind, str(enter.mode_after)) == ("enter_sliding", "00")
+    assert enter.t == pytest.approx(0.3 / 1.3, abs=1e-9)
+    np.testing.assert_allclose(sol.y[:, -1], [0.88, 0.0], rtol=0, atol=1e-9)

@@ -111,8 +111,9 @@ pub fn in_the_place_of(
         let moved = place.moved(later, &beside);
         system.surfaces(&moved, &mut h[0])?;
         let is_on = h[0][j].abs() <= ROUNDING * system.surface_size(j, &moved)?;
-        // Far away there may be no place on the surface.
-        if distance > BESIDE[0] && !is_on {
+        // Far away there may be no place on the surface, or the other function may have no value.
+        let is_far = distance > BESIDE[0];
+        if is_far && !is_on {
             break;
         }
         let mut vanishing = Vec::with_capacity(found.len());
@@ -120,7 +121,8 @@ pub fn in_the_place_of(
             let rate = system.gradient(k, &moved, &mut gradient)?;
             let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
             // One with a multiple zero has no gradient there.
-            if h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size {
+            let is_zero = h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size;
+            if is_zero || is_far && !size.is_finite() {
                 vanishing.push(k);
             }
         }
