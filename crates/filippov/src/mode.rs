@@ -72,13 +72,29 @@ impl Mode {
 
     /// The surfaces slid on.
     pub fn sliding_set(&self) -> impl Iterator<Item = usize> + '_ {
-        let entries = self.entries().iter().enumerate();
-        entries.filter(|(_, &e)| e == 0).map(|(j, _)| j)
+        let entries = self.entries();
+        let mut from = 0;
+        std::iter::from_fn(move || {
+            let found = next_zero(entries, from)?;
+            from = found + 1;
+            Some(found)
+        })
+    }
+
+    /// Entries that another mode has otherwise: those of this one, and those of the other.
+    pub(crate) fn changes_to<'m>(&'m self, other: &'m Mode) -> impl Iterator<Item = (i8, i8)> + 'm {
+        // Equal words of entries are passed at once.
+        let (words, rest) = self.entries().as_chunks::<8>();
+        let (others, others_rest) = other.entries().as_chunks();
+        let differing = words.iter().zip(others).filter(|(a, b)| a != b);
+        let pairs = differing.flat_map(|(a, b)| a.iter().zip(b));
+        let pairs = pairs.chain(rest.iter().zip(others_rest));
+        pairs.filter(|(a, b)| a != b).map(|(a, b)| (*a, *b))
     }
 
     /// Number of surfaces slid on.
     pub fn codimension(&self) -> usize {
-        self.entries().iter().filter(|&&e| e == 0).count()
+        self.sliding_set().count()
     }
 
     /// The entries of the first `n` surfaces, as a mode of these.
@@ -108,12 +124,13 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
-        let mut signs = match self.entries().len() {
-            few @ ..=FEW => Signs::from_buf_and_len([1.0; FEW], few),
-            many => Signs::from_elem(1.0, many),
-        };
-        for (sign, &entry) in signs.iter_mut().zip(self.entries()) {
-            *sign = if entry < 0 { -1.0 } else { 1.0 };
+        let entries = self.entries();
+        if entries.len() > FEW {
+            return Signs::from_vec(entries.iter().map(|&entry| sign_of(entry)).collect());
+        }
+        let mut signs = Signs::from_buf_and_len([1.0; FEW], entries.len());
+        for (sign, &entry) in signs.iter_mut().zip(entries) {
+            *sign = sign_of(entry);
         }
         signs
     }
@@ -121,6 +138,26 @@ impl Mode {
     /// Sets entry `j`.
     pub(crate) fn set(&mut self, j: usize, entry: i8) {
         self.entries_mut()[j] = entry;
+    }
+}
+
+/// -1.0 or, also for a zero, 1.0.
+#[inline]
+fn sign_of(entry: i8) -> f64 {
+    f64::from_bits(1.0_f64.to_bits() | u64::from(entry as u8) << 56 & (1 << 63))
+}
+
+/// The first entry from here on that is 0. Words of entries without one are passed at once.
+#[inline]
+fn next_zero(entries: &[i8], mut from: usize) -> Option<usize> {
+    // The entries that are not 0 are odd.
+    const ODD: u64 = u64::from_ne_bytes([1; 8]);
+    loop {
+        let rest = entries.get(from..)?;
+        match rest.first_chunk() {
+            Some(word) if u64::from_ne_bytes(word.map(|e| e as u8)) & ODD == ODD => from += 8,
+            _ => return rest.iter().position(|&e| e == 0).map(|k| from + k),
+        }
     }
 }
 
@@ -139,5 +176,43 @@ impl fmt::Display for Mode {
 impl fmt::Debug for Mode {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         write!(out, "Mode({self})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Mode;
+
+    /// Modes of up to 40 surfaces, with entries from the digits of a number to base 3.
+    fn modes() -> impl Iterator<Item = Vec<i8>> {
+        (0..600_u64).map(|k| {
+            let mut state = k.wrapping_mul(6_364_136_223_846_793_005);
+            let entries = (0..k % 41).map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(k);
+                // Few zeros, so that there are words without one.
+                [0, 1, -1, 1, 1, -1, -1, 1][(state >> 61) as usize]
+            });
+            entries.collect()
+        })
+    }
+
+    #[test]
+    fn words_hide_no_entry() {
+        for entries in modes() {
+            let mode = Mode::new(entries.clone());
+            let zeros = (0..entries.len()).filter(|&j| entries[j] == 0);
+            assert!(mode.sliding_set().eq(zeros.clone()));
+            assert_eq!(mode.codimension(), zeros.count());
+            let sides = entries.iter().map(|&e| if e < 0 { -1.0 } else { 1.0 });
+            assert!(mode.signs().into_iter().eq(sides));
+            for j in 0..entries.len() {
+                let other = mode.with(j, -1);
+                let changes: Vec<_> = mode.changes_to(&other).collect();
+                let expected: &[(i8, i8)] = &[(entries[j], -1)];
+                assert_eq!(changes, expected[usize::from(entries[j] == -1)..]);
+            }
+        }
     }
 }

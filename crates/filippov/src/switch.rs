@@ -89,10 +89,9 @@ impl Kind {
             return Kind::Grazing;
         }
         let (mut ended, mut begun) = (0, 0);
-        let pairs = before.entries().iter().zip(after.entries());
-        for (before, after) in pairs.filter(|(before, after)| before != after) {
-            ended += usize::from(*before == 0);
-            begun += usize::from(*after == 0);
+        for (before, after) in before.changes_to(after) {
+            ended += usize::from(before == 0);
+            begun += usize::from(after == 0);
         }
         match begun.cmp(&ended) {
             Greater => Kind::EnterSliding,

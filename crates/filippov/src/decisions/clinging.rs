@@ -37,7 +37,7 @@ pub(crate) fn cling(
     let h = at.surface_values(notes, at.arrival.signs)?;
     let (mut near, mut mode) = (Vec::new(), at.arrival.mode.clone());
     for j in 0..h.len() {
-        if !at.arrival.active[j] || at.triggers().is_only_trigger(j) {
+        if !at.arrival.active.has(j) || at.triggers().is_only_trigger(j) {
             continue;
         }
         let place = at.place(at.arrival.signs);
@@ -374,7 +374,7 @@ impl Roots<'_, '_, '_> {
             .moved(t, x)
             .surface_values(notes, &self.mode.signs())?;
         let others = (0..h.len()).filter(|&k| {
-            !self.surfaces.contains(&k) && self.at.arrival.active[k] && entries[k] != 0
+            !self.surfaces.contains(&k) && self.at.arrival.active.has(k) && entries[k] != 0
         });
         Ok(others.map(|k| f64::from(entries[k]) * h[k]).collect())
     }

@@ -248,7 +248,7 @@ pub(crate) fn differs_between_sides(
     motion: &CurrentMotion,
 ) -> Result<Option<Stop>, FieldError> {
     let CurrentMotion { mode, sliding, .. } = motion;
-    let is_checked = |k: usize| motion.active[k] && !motion.resting.contains(&k);
+    let is_checked = |k: usize| motion.known.active().has(k) && !motion.resting.contains(&k);
     if !(1..=MOST_MEETING).contains(&sliding.len()) {
         return Ok(None);
     }

@@ -80,14 +80,13 @@ fn add_inactive_that_begin_to_matter(
 ) -> Result<(), FieldError> {
     let before = &reached.before;
     let mut zeros = reached.surfaces.to_vec();
-    let inactive = h.iter().zip(at.arrival.active).enumerate();
-    for (j, (h, _)) in inactive.filter(|(_, (_, is_active))| !**is_active) {
+    for j in at.arrival.active.inactive() {
         let may_matter = before.entries()[j] != 0 && at.system.switches_at(j);
         if !may_matter || at.arrival.departing.contains(&j) || zeros.contains(&j) {
             continue;
         }
         let size = at.system.surface_size(j, &at.place(&before.signs()))?;
-        if h.abs() <= ROUNDING * size {
+        if h[j].abs() <= ROUNDING * size {
             zeros.push(j);
         }
     }
@@ -104,10 +103,9 @@ fn add_inactive_that_begin_to_matter(
 /// Gives surfaces that do not matter the sides of these values; whether one of them is another than before.
 fn set_sides_of_inactive(at: &Point, mode: &mut Mode, h: &[f64]) -> bool {
     let mut is_new = false;
-    let inactive = h.iter().zip(at.arrival.active).enumerate();
-    for (j, (h, _)) in inactive.filter(|(_, (_, is_active))| !**is_active) {
-        let side = if *h < 0.0 { -1 } else { 1 };
-        if *h != 0.0 && mode.entries()[j] != side {
+    for j in at.arrival.active.inactive() {
+        let side = if h[j] < 0.0 { -1 } else { 1 };
+        if h[j] != 0.0 && mode.entries()[j] != side {
             mode.set(j, side);
             is_new = true;
         }
@@ -115,11 +113,11 @@ fn set_sides_of_inactive(at: &Point, mode: &mut Mode, h: &[f64]) -> bool {
     is_new
 }
 
-/// Are all surfaces slid on or located, so that the values of none are needed?
+/// Are all surfaces slid on, located, or proved to be away from here, so that the values of none are needed?
 fn only_located_matter(arrival: &Arrival, located: &[usize]) -> bool {
-    let entries = arrival.mode.entries().iter().enumerate();
-    let mut settled = entries.map(|(j, &e)| e == 0 || located.contains(&j));
-    settled.all(|settled| settled) && arrival.active.iter().all(|active| *active)
+    let (entries, active) = (arrival.mode.entries(), arrival.active);
+    let is_settled = |&j: &usize| entries[j] == 0 || located.contains(&j);
+    active.are_all() && active.awake().iter().all(is_settled)
 }
 
 /// Adds to the surfaces that were located all others that vanish at the event: they matter, are not being left tangentially
@@ -130,7 +128,7 @@ pub(crate) fn add_vanishing_surfaces(
     h: &[f64],
 ) -> Result<(), FieldError> {
     let arrival = at.arrival;
-    for j in arrival.near() {
+    for &j in arrival.active.awake() {
         let h = h[j];
         // A surface that the motion rests on while it slides is in the place of one that it slides on.
         let slides = arrival.mode.entries()[j] == 0

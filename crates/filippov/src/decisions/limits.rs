@@ -29,13 +29,9 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// The limit of the rest of a series of which the last four members are known, if the two quotients of intervals agree with
-    /// one another and are those of a geometric series.
+    /// The limit of the rest of a geometric series of which the last four members are known.
     fn of(turns: [&Switch; 4], surfaces: Vec<usize>) -> Option<Limit> {
-        let [a, b, c] = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
-        let ratios = [b / a, c / b];
-        let noise = ROUNDING * turns[3].t.abs() / c;
-        shrinks_by(ratios).filter(|_| is_no_power(ratios, noise))?;
+        let ratios = ratios_of(turns)?;
         // Between impacts other bodies go on freely, by squares of the time.
         let is_corrected = turns[3].kind == Kind::Reset && ratios[1] <= SLOW_SHRINKING;
         let limit_of = |series: [f64; 3]| limit_of_series(series, ratios, is_corrected);
@@ -48,6 +44,15 @@ impl Limit {
             is_rest: false,
         })
     }
+}
+
+/// The two quotients of the intervals between four members of a series, if they agree and are those of a geometric series.
+fn ratios_of(turns: [&Switch; 4]) -> Option<[f64; 2]> {
+    let [a, b, c] = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
+    let ratios = [b / a, c / b];
+    let noise = ROUNDING * turns[3].t.abs() / c;
+    let shrinks = shrinks_by(ratios).is_some() && is_no_power(ratios, noise);
+    shrinks.then_some(ratios)
 }
 
 /// The limit of a series whose steps shrink by the ratio r, from its last members and the last two quotients of its steps: up to a
@@ -98,6 +103,9 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
     };
     let last = switches.len() - 1;
     let turns = [3, 2, 1, 0].map(|k| &switches[last - k * turn]);
+    if ratios_of(turns).is_none() {
+        return Ok(None);
+    }
     let Some(meeting) = meeting_of(at, &switches[last + 1 - turn..]) else {
         return Ok(None);
     };

@@ -1,5 +1,7 @@
 //! One surface vanishes: the fields of both sides decide.
 
+use std::cell::OnceCell;
+
 use super::choice::choose;
 use super::point::{Decided, Left, Next, Notes, Point};
 use super::rule::{How, Meeting};
@@ -24,8 +26,12 @@ pub(super) fn one_surface(
         How::Event(None) => return Ok(None),
         How::Limit => Arrival::Start,
     };
-    let (mode, signs) = (meeting.mode, meeting.mode.signs());
-    let decision = decide(at.system, j, arrival, &at.place(&signs))?;
+    let (mode, other_signs) = (meeting.mode, OnceCell::new());
+    let signs = match mode == at.arrival.mode {
+        true => at.arrival.signs,
+        false => other_signs.get_or_init(|| mode.signs()),
+    };
+    let decision = decide(at.system, j, arrival, &at.place(signs))?;
     let is_event = matches!(meeting.how, How::Event(_));
     let is_rounding = decision.is_rounding();
     if !is_event || is_rounding == [false; 2] {
@@ -34,9 +40,9 @@ pub(super) fn one_surface(
     // A field that is tangent to the surface: beside it, by rounding, it still points somewhere.
     let mut x = at.x.to_vec();
     let mut projector = Projector::new(x.len(), signs.len());
-    projector.project(at.system, j, at.t, &mut x, at.setting(&signs))?;
+    projector.project(at.system, j, at.t, &mut x, at.setting(signs))?;
     let arrival = arrival.to_tangency(is_rounding);
-    let decision = decide(at.system, j, arrival, &at.place_at(at.t, &x, &signs))?;
+    let decision = decide(at.system, j, arrival, &at.place_at(at.t, &x, signs))?;
     let decided = follow_at_surface(at, notes, mode, j, decision);
     Ok(Some(decided.map(|mut next| {
         next.start_mut().moved = Some(x);

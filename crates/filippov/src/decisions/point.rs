@@ -1,6 +1,6 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use crate::motion::{Asleep, Triggers};
+use crate::motion::{ActiveSurfaces, Triggers};
 use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
@@ -95,9 +95,7 @@ pub(crate) struct Arrival<'p, 'a> {
     /// The side of every surface on which the motion is; where its entry is 0, that on which it was last.
     pub sides: &'p [i8],
     /// The surfaces whose sign matters in the mode.
-    pub active: &'p [bool],
-    /// Surfaces that are proved to be away from here, where any are.
-    pub asleep: Option<&'p Asleep>,
+    pub active: &'p ActiveSurfaces,
     /// The surfaces whose functions were zero all along the motion.
     pub resting: &'p [usize],
     /// The surfaces that the motion is still leaving tangentially.
@@ -115,15 +113,6 @@ pub(crate) struct Arrival<'p, 'a> {
 }
 
 impl<'p> Arrival<'p, '_> {
-    /// The surfaces that matter and are not proved to be away from here.
-    pub fn near(&self) -> impl Iterator<Item = usize> + 'p {
-        let asleep = self.asleep;
-        let is_away = move |j: usize| asleep.is_some_and(|asleep| asleep.is_proved(j));
-        let all = self.active.iter().enumerate();
-        all.filter(move |(j, is_active)| **is_active && !is_away(*j))
-            .map(|(j, _)| j)
-    }
-
     /// The multipliers of the motion at the last evaluation of its field.
     pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         self.field.borrow().multipliers()

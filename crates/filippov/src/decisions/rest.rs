@@ -68,7 +68,7 @@ pub(crate) fn rest_within_tolerance(
     let mut surfaces = Vec::new();
     for (j, &h) in h.iter().enumerate() {
         let place = at.place(signs);
-        if at.arrival.active[j] && is_zero_within(at.system, &place, (j, h), at.scale)? {
+        if at.arrival.active.has(j) && is_zero_within(at.system, &place, (j, h), at.scale)? {
             surfaces.push(j);
         }
     }

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use smallvec::SmallVec;
 
 use super::point::{Arrival, Cause, Notes, Point};
-use crate::motion::Run;
+use crate::motion::{Asleep, Run};
 use crate::patience::Patience;
 use crate::switch::Switch;
 
@@ -32,14 +32,21 @@ impl<'a> Scene<'_, 'a> {
         let motion = &mut run.motion;
         let mut departing = SmallVec::new();
         motion.departing().for_each(|j| departing.push(j));
+        let (asleep, everywhere) = (&motion.asleep, &mut None);
+        let active = motion.known.active();
+        let active = match asleep.has_any() {
+            true if !asleep.contains_point(run.t, &run.x, &motion.discrete) => {
+                &*everywhere.insert(active.beside(&Asleep::default()))
+            }
+            _ => active,
+        };
         let arrival = Arrival {
             cause,
             mode: &motion.mode,
             signs: &motion.signs,
             sliding: &motion.sliding,
             sides: &motion.sides,
-            active: &motion.active,
-            asleep: motion.asleep.known_at(run.t, &run.x, &motion.discrete),
+            active,
             resting: &motion.resting,
             departing,
             switches: self.switches,

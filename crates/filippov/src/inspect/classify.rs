@@ -11,7 +11,7 @@ use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::motion::Leading;
-use crate::motion::{Guard, Law, MeetingFields, ModeField, SmoothField};
+use crate::motion::{ActiveSurfaces, Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::options::{NonUnique, Options};
 use crate::patience::Patience;
 use crate::status::Stop;
@@ -145,8 +145,7 @@ pub fn classify(
     let start = Mode::new(vec![1; system.n_surfaces()]);
     let mode = how.before.unwrap_or(&start);
     let (signs, sliding): (_, Vec<usize>) = (mode.signs(), mode.sliding_set().collect());
-    let mut active = vec![false; signs.len()];
-    system.active(&signs, &sliding, &mut active);
+    let active = ActiveSurfaces::new(system, &signs, &sliding);
     let place = Setting::new(&signs, how.q).at(t, x);
     let residuals = residuals_within(system, &place, how.reach)?;
     let mut field = ModeField::of(system, law, mode, how.q);
@@ -166,7 +165,6 @@ pub fn classify(
         sliding: &sliding,
         sides: &sides_before,
         active: &active,
-        asleep: None,
         resting: &[],
         departing: SmallVec::new(),
         switches: &[],

@@ -1048,9 +1048,8 @@ fn forget_choices(integrator: &mut Integrator<'_>) {
 
 /// Updates the discrete states that the mode did not read. A decision may read them.
 fn follow_laws(integrator: &mut Integrator<'_>) -> Result<(), FieldError> {
-    let (actions, active) = (integrator.run.actions, &integrator.run.motion.active);
-    let is_idle =
-        |trigger: &Trigger| matches!(*trigger, Trigger::Surface { index, .. } if !active[index]);
+    let (actions, active) = (integrator.run.actions, integrator.run.motion.known.active());
+    let is_idle = |trigger: &Trigger| matches!(*trigger, Trigger::Surface { index, .. } if !active.has(index));
     let idle = actions
         .list
         .iter()

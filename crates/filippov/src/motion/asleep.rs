@@ -23,8 +23,8 @@ pub(crate) struct Asleep {
     around: Vec<[f64; 2]>,
     /// The sign of each function in the box, 0 if it is not proved.
     sides: Vec<i8>,
-    /// How many are proved.
-    n_proved: usize,
+    /// The functions of which it is not proved.
+    awake: Vec<usize>,
     /// The discrete states that they are proved for.
     discrete: Vec<f64>,
 }
@@ -51,17 +51,12 @@ impl Asleep {
     /// Is any asleep?
     #[inline(always)]
     pub fn has_any(&self) -> bool {
-        self.n_proved > 0
+        self.awake.len() < self.sides.len()
     }
 
-    /// Is a surface asleep on this side?
-    pub fn has(&self, j: usize, side: i8) -> bool {
-        side != 0 && self.sides.get(j) == Some(&side)
-    }
-
-    /// Is its function proved to have one sign?
-    pub fn is_proved(&self, j: usize) -> bool {
-        self.sides.get(j).is_some_and(|&side| side != 0)
+    /// The others, in order.
+    pub fn awake(&self) -> &[usize] {
+        &self.awake
     }
 
     /// The curved switching functions that are not asleep, if surfaces are asleep and these are few.
@@ -69,17 +64,9 @@ impl Asleep {
         if !self.has_any() {
             return None;
         }
-        let mut awake = SmallVec::new();
-        for j in (0..system.n_surfaces()).filter(|&j| !system.is_affine(j)) {
-            if self.is_proved(j) {
-                continue;
-            }
-            if awake.len() == MOST_CHOSEN_SERIES {
-                return None;
-            }
-            awake.push(j);
-        }
-        Some(awake)
+        let curved = self.awake.iter().filter(|&&j| !system.is_affine(j));
+        let curved: SmallVec<[usize; 4]> = curved.copied().collect();
+        (curved.len() <= MOST_CHOSEN_SERIES).then_some(curved)
     }
 
     /// Wakes all for good: where the field ends at its surfaces, their distance limits the steps.
@@ -94,17 +81,7 @@ impl Asleep {
         if self.around.is_empty() || self.discrete != discrete {
             return false;
         }
-        self.n_proved == 0
-            || self.contains(std::iter::once([t; 2]).chain(x.iter().map(|&x| [x; 2])))
-    }
-
-    /// What is proved at this point, for these discrete states.
-    #[inline(always)]
-    pub fn known_at(&self, t: f64, x: &[f64], discrete: &[f64]) -> Option<&Self> {
-        match self.has_any() {
-            true => self.contains_point(t, x, discrete).then_some(self),
-            false => None,
-        }
+        !self.has_any() || self.contains(std::iter::once([t; 2]).chain(x.iter().map(|&x| [x; 2])))
     }
 
     /// Does the box contain these ranges, time first, for these discrete states?
@@ -151,26 +128,48 @@ impl Asleep {
             [lo - by, hi + by]
         };
         self.around.extend(self.seen.iter().map(wider));
-        // Times before the run do not come.
-        self.around[0][0] = self.seen[0][0];
         self.discrete.clear();
         self.discrete.extend_from_slice(q);
         // No function contains a sign.
         let signs: SmallVec<[f64; 16]> = SmallVec::from_elem(1.0, system.n_surfaces());
         let setting = Setting::new(&signs, q);
-        let around = Around(&self.around);
-        let sides = (0..system.n_surfaces()).map(|j| {
-            let bounds = system.enclose_surface(j, &around, setting);
-            match bounds.map(|bounds| bounds.value) {
-                // More than rounding: nothing counts as a touch there.
-                Some(value) if value.lo > CLEAR_IN_BOX * value.hi => 1,
-                Some(value) if value.hi < CLEAR_IN_BOX * value.lo => -1,
-                _ => 0,
-            }
-        });
+        // Times before the run do not come. A function that does not depend on time has its sign for ever.
+        let for_a_while = [self.seen[0][0], self.around[0][1]];
+        self.around[0] = [self.seen[0][0], f64::INFINITY];
+        let mut bounds = vec![Enclosure::UNKNOWN; system.n_surfaces()];
+        system.enclose_surfaces(&Around(&self.around), setting, &mut bounds);
         self.sides.clear();
-        self.sides.extend(sides);
-        self.n_proved = self.sides.iter().filter(|&&side| side != 0).count();
+        self.sides.extend(bounds.into_iter().map(side_of));
+        self.list_awake();
+        let for_ever = std::mem::replace(&mut self.around[0], for_a_while);
+        let n_awake = self.awake.len();
+        for &j in &self.awake {
+            let bounds = system.enclose_surface(j, &Around(&self.around), setting);
+            self.sides[j] = bounds.map_or(0, side_of);
+        }
+        self.list_awake();
+        if self.awake.len() == n_awake {
+            self.around[0] = for_ever;
+        }
+    }
+
+    fn list_awake(&mut self) {
+        let awake = self
+            .sides
+            .iter()
+            .enumerate()
+            .filter(|(_, side)| **side == 0);
+        self.awake.clear();
+        self.awake.extend(awake.map(|(j, _)| j));
+    }
+}
+
+/// The sign of a function with these bounds, 0 if it may vanish. It is larger than rounding: nothing counts as a touch there.
+fn side_of(bounds: Enclosure) -> i8 {
+    match bounds.value {
+        value if value.lo > CLEAR_IN_BOX * value.hi => 1,
+        value if value.hi < CLEAR_IN_BOX * value.lo => -1,
+        _ => 0,
     }
 }
 
@@ -225,14 +224,38 @@ mod tests {
         for k in 0..20 {
             let level = k as f64 + 0.5;
             let is_outside = level < lo || level > hi;
-            assert_eq!(asleep.is_proved(k), is_outside);
-            assert_eq!(asleep.has(k, -1), level > hi);
+            assert_eq!(asleep.awake().contains(&k), !is_outside);
+            let side = if level > hi { -1 } else { 1 };
+            assert_eq!(asleep.sides[k], if is_outside { side } else { 0 });
         }
         assert!(asleep.contains_point(0.0, &[1.0], &[]));
         assert!(!asleep.contains_point(0.0, &[1.0], &[2.0]));
         assert!(!asleep.contains_point(0.0, &[hi + 1.0], &[]));
         asleep.end();
         assert!(!asleep.is_used() && !asleep.has_any());
+    }
+
+    #[test]
+    fn what_depends_on_time_is_proved_for_a_while() {
+        let proved_until = |is_in_time: bool| {
+            let mut g = Graph::new();
+            let (x, t) = (g.state(0), g.time());
+            let mut rate = g.constant(0.0);
+            for k in 0..FEWEST_ASLEEP {
+                let level = g.constant(10.0 + k as f64);
+                let h = g.sub(if k == 0 && is_in_time { t } else { x }, level);
+                let sign = g.sign(h);
+                rate = g.add(rate, sign);
+            }
+            let system =
+                TracedSystem::new(g, vec![rate], Vec::new(), Names::default(), Backend::Auto);
+            let (system, mut asleep) = (system.unwrap(), Asleep::default());
+            asleep.follow(&system, &[[0.0, 1.0], [0.0, 1.0]], &[]);
+            assert!(asleep.awake().is_empty());
+            asleep.around[0][1]
+        };
+        assert_eq!(proved_until(false), f64::INFINITY);
+        assert!((1.0..10.0).contains(&proved_until(true)));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::far_ends::FarEnds;
+use super::known_modes::KnownModes;
 use super::{
     AffineBounds, Asleep, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField,
     SlidingSet, Triggers,
@@ -15,22 +16,8 @@ use crate::options::SlidingRule;
 use crate::system::Actions;
 use crate::system::{MotionJets, PiecewiseSystem, Setting};
 
-/// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
-const MOST_KNOWN: usize = 8;
-
 /// Fields that are kept of earlier motions.
 const MOST_IDLE: usize = 8;
-
-/// What follows from a mode alone, wherever its motion starts.
-#[derive(Clone)]
-struct KnownMode {
-    mode: Mode,
-    active: SmallVec<[bool; 8]>,
-    /// Its Taylor series, once they were asked for and if there are any.
-    jets: Option<Option<Arc<MotionJets>>>,
-    /// What is monitored, where nothing rests and there is no contact.
-    monitored: Option<SmallVec<[Monitored; 2]>>,
-}
 
 /// One piece of constant mode.
 #[derive(Clone)]
@@ -39,8 +26,6 @@ pub(crate) struct CurrentMotion<'a> {
     pub t_start: f64,
     /// Signs handed to the field; the surfaces slid on count as +1.
     pub signs: Signs,
-    /// Surfaces whose sign matters in this mode.
-    pub active: SmallVec<[bool; 8]>,
     pub field: ModeField<'a>,
     /// The surfaces slid on, in increasing order.
     pub sliding: SlidingSet,
@@ -52,11 +37,10 @@ pub(crate) struct CurrentMotion<'a> {
     pub is_straight: bool,
     /// Fields of other kinds, or on other surfaces, that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
-    known: Vec<KnownMode>,
+    /// What follows from the modes that it has had.
+    pub known: KnownModes,
     /// Surfaces that need not be monitored for the time being.
     pub asleep: Asleep,
-    /// The place of the present mode among them.
-    current: usize,
     pub monitored: Vec<Monitored>,
     /// It slides on several surfaces, some of them with static friction above kinetic.
     sticks: bool,
@@ -92,16 +76,14 @@ impl<'a> CurrentMotion<'a> {
         let setting = Setting::new(&signs, &actions.discrete);
         let mut motion = CurrentMotion {
             t_start,
-            active: SmallVec::new(),
             field: ModeField::new(system, law, &sliding, setting),
             affine_bounds: None,
             far_ends: FarEnds::default(),
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
-            known: Vec::with_capacity(MOST_KNOWN),
+            known: KnownModes::default(),
             asleep,
-            current: 0,
             monitored: Vec::new(),
             sticks: false,
             is_held: false,
@@ -137,10 +119,8 @@ impl<'a> CurrentMotion<'a> {
                 .for_each(|(side, &entry)| *side = entry);
         }
         self.sliding.clear();
-        for (j, &entry) in mode.entries().iter().enumerate() {
-            if entry == 0 {
-                self.sliding.push(j);
-            }
+        for j in mode.sliding_set() {
+            self.sliding.push(j);
         }
         self.signs = mode.signs();
         self.mode = mode;
@@ -155,7 +135,7 @@ impl<'a> CurrentMotion<'a> {
     /// Stays in whatever mode it restarts in: nothing is monitored any more.
     pub fn hold(&mut self) {
         self.is_held = true;
-        self.known.clear();
+        self.known.wake(&self.asleep);
     }
 
     /// Makes the field that of the mode.
@@ -177,11 +157,13 @@ impl<'a> CurrentMotion<'a> {
             return;
         }
         let mut idle = self.idle.iter_mut();
-        let field = match idle.position(|field| field.restart(sliding, setting)) {
-            Some(index) => self.idle.swap_remove(index),
-            None => ModeField::new(system, self.law, sliding, setting),
-        };
-        self.replace_field(field);
+        match idle.position(|field| field.restart(sliding, setting)) {
+            Some(index) if self.field.is_lasting() => {
+                std::mem::swap(&mut self.field, &mut self.idle[index]);
+            }
+            Some(index) => self.field = self.idle.swap_remove(index),
+            None => self.replace_field(ModeField::new(system, self.law, sliding, setting)),
+        }
     }
 
     /// The signs handed to the field, and the discrete states.
@@ -210,22 +192,8 @@ impl<'a> CurrentMotion<'a> {
     /// Finds what is known of the present mode.
     #[inline(always)]
     fn recall(&mut self, system: &dyn PiecewiseSystem) {
-        let place = self.known.iter().position(|known| known.mode == self.mode);
-        self.current = place.unwrap_or_else(|| {
-            if self.known.len() == MOST_KNOWN {
-                self.known.clear();
-            }
-            let mut active = SmallVec::from_elem(false, self.signs.len());
-            system.active(&self.signs, &self.sliding, &mut active);
-            self.known.push(KnownMode {
-                mode: self.mode.clone(),
-                active,
-                jets: None,
-                monitored: None,
-            });
-            self.known.len() - 1
-        });
-        self.active = SmallVec::from_slice(&self.known[self.current].active);
+        let signs = (&self.signs, &self.sliding[..]);
+        self.known.recall(system, &self.mode, signs, &self.asleep);
     }
 
     /// The Taylor series of the mode; `find` looks for them the first time: for those on the surfaces slid on, with these curved switching
@@ -236,7 +204,7 @@ impl<'a> CurrentMotion<'a> {
         system: &dyn PiecewiseSystem,
         find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
     ) -> Option<Arc<MotionJets>> {
-        match &self.known[self.current].jets {
+        match &self.known.present().jets {
             Some(Some(jets)) => Some(Arc::clone(jets)),
             Some(None) => None,
             None => self.find_jets(system, find),
@@ -252,7 +220,7 @@ impl<'a> CurrentMotion<'a> {
     ) -> Option<Arc<MotionJets>> {
         let awake = self.asleep.curved_awake(system);
         let found = find(&self.sliding, awake.as_deref());
-        self.known[self.current].jets = Some(found.clone());
+        self.known.present().jets = Some(found.clone());
         found
     }
 
@@ -261,7 +229,7 @@ impl<'a> CurrentMotion<'a> {
         self.sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
         let is_plain = self.resting.is_empty()
             && matches!(self.field, ModeField::Region(_) | ModeField::Sliding(_));
-        let known = self.known[self.current].monitored.as_ref();
+        let known = self.known.present().monitored.as_ref();
         self.monitored.clear();
         match known.filter(|_| is_plain) {
             Some(known) => self.monitored.extend_from_slice(known),
@@ -269,7 +237,7 @@ impl<'a> CurrentMotion<'a> {
                 self.list_monitored(system);
                 if is_plain {
                     let listed = SmallVec::from_slice(&self.monitored);
-                    self.known[self.current].monitored = Some(listed);
+                    self.known.present().monitored = Some(listed);
                 }
             }
         }
@@ -297,8 +265,8 @@ impl<'a> CurrentMotion<'a> {
             deflation: None,
             noise: 0.0,
         };
-        for j in 0..self.signs.len() {
-            if self.is_to_monitor(j) {
+        for &j in self.known.active().awake() {
+            if self.mode.entries()[j] != 0 && !self.resting.contains(&j) {
                 let affine = system.is_affine(j);
                 let listed = monitor(Guard::Surface(j), j, self.signs[j], affine);
                 self.monitored.push(listed);
@@ -307,12 +275,6 @@ impl<'a> CurrentMotion<'a> {
         let exits = self.field.guards().into_iter().enumerate();
         self.monitored
             .extend(exits.map(|(place, guard)| monitor(guard, place, 1.0, false)));
-    }
-
-    /// Is a surface monitored in this mode, as far as it is not asleep?
-    fn is_to_monitor(&self, j: usize) -> bool {
-        let side = self.mode.entries()[j];
-        self.active[j] && side != 0 && !self.resting.contains(&j) && !self.asleep.has(j, side)
     }
 
     /// The motion is about to start at this point: finds out which surfaces are asleep there.
@@ -328,7 +290,7 @@ impl<'a> CurrentMotion<'a> {
     fn find_asleep(&mut self, system: &dyn PiecewiseSystem, t: f64, x: &[f64]) {
         if !self.asleep.contains_point(t, x, &self.discrete) {
             self.asleep.look_around(system, t, x, &self.discrete);
-            self.known.clear();
+            self.known.wake(&self.asleep);
         }
     }
 
@@ -351,8 +313,7 @@ impl<'a> CurrentMotion<'a> {
 
     /// Lists anew what is monitored; what was monitored stays as it was, and what is divided out stays monitored.
     fn list_again(&mut self, system: &dyn PiecewiseSystem) -> SmallVec<[usize; 8]> {
-        self.known.clear();
-        self.recall(system);
+        self.known.wake(&self.asleep);
         let before = std::mem::take(&mut self.monitored);
         self.list_monitored(system);
         let mut woken = SmallVec::new();

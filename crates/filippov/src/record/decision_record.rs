@@ -10,7 +10,7 @@ use crate::decisions::{
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
-use crate::motion::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
+use crate::motion::{ActiveSurfaces, ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
 use crate::options::Options;
 use crate::patience::Patience;
 use crate::system::Actions;
@@ -141,8 +141,7 @@ pub fn replay_decision(
 ) -> Result<DecisionOutcome, FieldError> {
     let (t, mode, law) = (point.t, &point.mode, Law::from(options));
     let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
-    let mut active = vec![false; signs.len()];
-    system.active(&signs, &sliding, &mut active);
+    let active = ActiveSurfaces::new(system, &signs, &sliding);
     let contact = if actions.list.is_empty() || sliding.is_empty() {
         None
     } else {
@@ -163,7 +162,6 @@ pub fn replay_decision(
         sliding: &sliding,
         sides: &point.sides,
         active: &active,
-        asleep: None,
         resting: &point.resting,
         departing: SmallVec::from_slice(&point.departing),
         switches: &[],

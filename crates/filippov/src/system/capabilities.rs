@@ -128,6 +128,18 @@ impl dyn PiecewiseSystem + '_ {
         self.enclosures()?.enclose_surface(j, motion, setting)
     }
 
+    /// The same of all switching functions, as far as there are any.
+    pub fn enclose_surfaces(
+        &self,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+        bounds: &mut [Enclosure],
+    ) {
+        if let Some(enclosures) = self.enclosures() {
+            enclosures.enclose_surfaces(motion, setting, bounds);
+        }
+    }
+
     /// Bounds of the normal components of f- and f+ at h_j, and of their rates, along a piece of motion on that surface.
     pub fn enclose_normal_components(
         &self,

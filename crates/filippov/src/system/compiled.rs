@@ -51,7 +51,8 @@ pub(super) struct Model {
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
     first_lie: Vec<OnceLock<TieredProgram>>,
-    enclosed_surfaces: Vec<OnceLock<Option<EnclosureProgram>>>,
+    enclosed_surface: Vec<OnceLock<Option<EnclosureProgram>>>,
+    enclosed_surfaces: OnceLock<Option<EnclosureProgram>>,
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     rate_gradients: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
@@ -177,7 +178,8 @@ impl Model {
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
             first_lie: surfaces.iter().map(|_| OnceLock::new()).collect(),
-            enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            enclosed_surface: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            enclosed_surfaces: OnceLock::new(),
             enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
             rate_gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             sticking: FxHashMap::default(),
@@ -387,8 +389,17 @@ impl Model {
 
     /// Bounds of h_j along a motion.
     pub fn enclosed_surface(&self, j: usize) -> Option<&EnclosureProgram> {
-        let program = self.enclosed_surfaces[j].get_or_init(|| {
+        let program = self.enclosed_surface[j].get_or_init(|| {
             EnclosureProgram::compile(&self.graph, &[self.graph.surface(j as u32)]).ok()
+        });
+        program.as_ref()
+    }
+
+    /// Bounds of all switching functions along a motion.
+    pub fn enclosed_surfaces(&self) -> Option<&EnclosureProgram> {
+        let program = self.enclosed_surfaces.get_or_init(|| {
+            let surfaces = (0..self.affine.len()).map(|j| self.graph.surface(j as u32));
+            EnclosureProgram::compile(&self.graph, &surfaces.collect::<Vec<_>>()).ok()
         });
         program.as_ref()
     }

@@ -19,6 +19,19 @@ pub trait Enclosures {
         setting: Setting<'_>,
     ) -> Option<Enclosure>;
 
+    /// The same of all switching functions; [`Enclosure::UNKNOWN`] of one that has none.
+    fn enclose_surfaces(
+        &self,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+        bounds: &mut [Enclosure],
+    ) {
+        for (j, bounds) in bounds.iter_mut().enumerate() {
+            let found = self.enclose_surface(j, motion, setting);
+            *bounds = found.unwrap_or(Enclosure::UNKNOWN);
+        }
+    }
+
     /// Bounds of the normal components of f- and f+ at h_j, and of their rates, along a piece of motion on that surface.
     fn enclose_normal_components(
         &self,

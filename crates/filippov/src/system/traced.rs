@@ -611,6 +611,18 @@ impl Enclosures for TracedSystem {
         Some(out[0])
     }
 
+    fn enclose_surfaces(
+        &self,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+        bounds: &mut [Enclosure],
+    ) {
+        if let Some(program) = self.model.enclosed_surfaces() {
+            let signs = setting.signs;
+            self.with_values(setting.q, |p| program.eval(motion, signs, p, bounds));
+        }
+    }
+
     fn enclose_normal_components(
         &self,
         j: usize,
