@@ -151,6 +151,9 @@ struct Pivots<'a> {
     /// nu, and N where it is damped, with d.
     nu: Vec<f64>,
     damped: Option<SparseRows>,
+    /// Does no sign act on the rate of another surface?
+    is_diagonal: bool,
+    n_divisions: usize,
     solver: SparseSolver,
     n_pivots: usize,
     patience: Patience<'a>,
@@ -172,6 +175,8 @@ impl<'a> Pivots<'a> {
         Pivots {
             nu: problem.nu.clone(),
             damped: None,
+            is_diagonal: problem.n.is_diagonal(),
+            n_divisions: 0,
             problem,
             is_idle,
             uniqueness,
@@ -287,17 +292,27 @@ impl<'a> Pivots<'a> {
     fn state(&mut self, modes: &[i8]) -> Result<State, Singular> {
         let m = modes.len();
         let mut signs: Vec<f64> = modes.iter().map(|&mode| f64::from(mode)).collect();
-        let sliding: Vec<usize> = (0..m).filter(|&i| modes[i] == 0).collect();
-        let mut unknown: Vec<f64> = sliding
-            .iter()
-            .map(|&i| -self.nu[i] - self.n().dot(i, &signs))
-            .collect();
+        let sliding = (0..m).filter(|&i| modes[i] == 0);
+        let n = self.damped.as_ref().unwrap_or(&self.problem.n);
         self.n_pivots += 1;
-        let equations = self.n().principal(&sliding);
-        self.solver.factor(&equations)?;
-        self.solver.solve(&mut unknown);
-        for (&i, &sign) in sliding.iter().zip(&unknown) {
-            signs[i] = sign;
+        if self.is_diagonal {
+            for i in sliding {
+                let entry = n.diagonal(i);
+                if entry == 0.0 {
+                    return Err(Singular { unknowns: vec![i] });
+                }
+                signs[i] = -self.nu[i] / entry;
+                self.n_divisions += 1;
+            }
+        } else {
+            let sliding: Vec<usize> = sliding.collect();
+            let loads = sliding.iter().map(|&i| -self.nu[i] - n.dot(i, &signs));
+            let mut unknown: Vec<f64> = loads.collect();
+            self.solver.factor(&n.principal(&sliding))?;
+            self.solver.solve(&mut unknown);
+            for (&i, &sign) in sliding.iter().zip(&unknown) {
+                signs[i] = sign;
+            }
         }
         let rate = |i: usize| match modes[i] {
             0 => 0.0,
@@ -359,7 +374,7 @@ impl<'a> Pivots<'a> {
             degenerate,
             loops: Vec::new(),
             n_pivots: self.n_pivots,
-            n_operations: self.solver.n_operations(),
+            n_operations: self.n_divisions + self.solver.n_operations(),
         })
     }
 }

@@ -3,12 +3,16 @@
 use std::cell::RefCell;
 
 use filippov_expr::{Enclosure, Interval, Motion};
+use smallvec::SmallVec;
 
-use crate::cube::{IntervalVector, Vector};
+use crate::cube::IntervalVector;
 use crate::mode::Signs;
 use crate::page::IS_PAGE;
 use crate::sparse::{SparseRows, SparseSolver};
 use crate::system::{AffineSigns, Setting};
+
+/// Rates of some contacts.
+type Rates = SmallVec<[f64; 16]>;
 
 /// What bounds the multipliers of a mode where gradients and N = grad h B are constant.
 ///
@@ -123,8 +127,8 @@ impl AffineBounds {
         if !g.iter().all(|g| g.is_bounded()) {
             return None;
         }
-        let mut middles: Vector = g.iter().map(|g| 0.5 * (g.lo + g.hi)).collect();
-        let mut radii: Vector = g.iter().map(|g| 0.5 * (g.hi - g.lo)).collect();
+        let mut middles: Rates = g.iter().map(|g| 0.5 * (g.lo + g.hi)).collect();
+        let mut radii: Rates = g.iter().map(|g| 0.5 * (g.hi - g.lo)).collect();
         self.normal.borrow_mut().solve(&mut middles);
         self.comparison.borrow_mut().solve(&mut radii);
         let largest = middles.iter().fold(0.0_f64, |m, v| m.max(v.abs()));

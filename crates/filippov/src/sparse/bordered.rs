@@ -136,7 +136,7 @@ impl Border {
         if apart.is_empty() || apart.len() > MOST_BORDERED.min(n / 8) {
             return None;
         }
-        let core = matrix.principal(&rest);
+        let core = matrix.principal(&rest).into_owned();
         let bordered = work(&components(&core)) + 2 * SOLUTIONS * n * apart.len();
         if BORDER_GAIN * bordered as f64 > work(&components(matrix)) as f64 {
             return None;

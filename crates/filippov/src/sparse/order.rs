@@ -63,7 +63,7 @@ pub fn coupled_blocks(matrix: &SparseRows) -> Vec<(Vec<usize>, SparseRows)> {
     let parts = components(matrix).into_iter().map(|component| {
         let mut unknowns = component.unknowns;
         unknowns.sort_unstable();
-        let block = matrix.principal(&unknowns);
+        let block = matrix.principal(&unknowns).into_owned();
         (unknowns, block)
     });
     parts.collect()

@@ -1,5 +1,7 @@
 //! Sparse matrices by rows, and their product.
 
+use std::borrow::Cow;
+
 /// A sparse matrix by rows. The pattern is kept while values change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseRows {
@@ -163,9 +165,9 @@ impl SparseRows {
 
     /// Rows and columns of a square matrix that `kept` lists in increasing order.
     #[must_use]
-    pub fn principal(&self, kept: &[usize]) -> SparseRows {
+    pub fn principal(&self, kept: &[usize]) -> Cow<'_, SparseRows> {
         if kept.len() == self.n_rows() {
-            return self.clone();
+            return Cow::Borrowed(self);
         }
         let n_entries = kept.iter().map(|&i| self.columns(i).len()).sum();
         let mut block = SparseRows::with_capacity(kept.len(), (kept.len(), n_entries));
@@ -173,13 +175,13 @@ impl SparseRows {
             for (place, &i) in kept.iter().enumerate() {
                 block.push_row(self.row(i).map(|(_, value)| (place, value)));
             }
-            return block;
+            return Cow::Owned(block);
         }
         for &i in kept {
             let place = |(j, value)| kept.binary_search(&j).ok().map(|place| (place, value));
             block.push_row(self.row(i).filter_map(place));
         }
-        block
+        Cow::Owned(block)
     }
 
     /// The matrix with each column multiplied by a factor.
@@ -249,44 +251,39 @@ pub struct SparseProduct {
 impl SparseProduct {
     /// Finds the pattern of A B^T. Its diagonal is always kept.
     pub fn new(a: &SparseRows, b: &SparseRows) -> Self {
-        // For each column of B, the rows and entries that have it, one column after the other.
-        let mut ends = vec![0; b.n_columns() + 1];
-        b.columns.iter().for_each(|&column| ends[column + 1] += 1);
-        for column in 0..b.n_columns() {
-            ends[column + 1] += ends[column];
-        }
-        let starts = ends.clone();
-        let mut users = vec![(0, 0); b.columns.len()];
+        // Column, row and place of the entries of B, one column after the other.
+        let mut users = Vec::with_capacity(b.n_entries());
         for j in 0..b.n_rows() {
-            for (offset, &column) in b.columns(j).iter().enumerate() {
-                users[ends[column]] = (j, (b.starts[j] + offset) as u32);
-                ends[column] += 1;
-            }
+            let entries = (b.starts[j] as u32..).zip(b.columns(j));
+            users.extend(entries.map(|(entry, &column)| (column, j, entry)));
         }
+        users.sort_unstable();
         let room = (a.n_rows(), a.n_entries().max(a.n_rows()));
         let mut matrix = SparseRows::with_capacity(b.n_rows(), room);
-        let mut terms = Vec::with_capacity(a.n_entries());
-        let (mut met, mut columns) = (Vec::new(), Vec::new());
+        let (mut terms, mut met) = (Vec::with_capacity(a.n_entries()), Vec::new());
         for i in 0..a.n_rows() {
             met.clear();
-            for (offset, &column) in a.columns(i).iter().enumerate() {
-                let entry = (a.starts[i] + offset) as u32;
-                let users = &users[starts[column]..ends[column]];
-                met.extend(users.iter().map(|&(j, other)| (j, entry, other)));
+            for (entry, &column) in (a.starts[i] as u32..).zip(a.columns(i)) {
+                let first = users.partition_point(|user| user.0 < column);
+                let users = users[first..].iter().take_while(|user| user.0 == column);
+                met.extend(users.map(|&(_, j, other)| (j, entry, other)));
             }
             met.sort_unstable();
-            columns.clear();
-            columns.extend(met.iter().map(|term| term.0));
-            columns.extend((i < b.n_rows()).then_some(i));
-            columns.sort_unstable();
-            columns.dedup();
             let start = matrix.n_entries();
+            let mut diagonal = (i < b.n_rows()).then_some(i);
             for &(j, entry, other) in &met {
-                let slot = start + columns.partition_point(|&column| column < j);
-                terms.push((slot as u32, entry, other));
+                if let Some(i) = diagonal.take_if(|i| *i <= j) {
+                    matrix.columns.push(i);
+                }
+                if matrix.columns[start..].last() != Some(&j) {
+                    matrix.columns.push(j);
+                }
+                terms.push((matrix.columns.len() as u32 - 1, entry, other));
             }
-            matrix.push_row(columns.iter().map(|&column| (column, 0.0)));
+            matrix.columns.extend(diagonal);
+            matrix.starts.push(matrix.columns.len());
         }
+        matrix.values.resize(matrix.columns.len(), 0.0);
         SparseProduct { terms, matrix }
     }
 

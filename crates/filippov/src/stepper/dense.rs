@@ -197,15 +197,31 @@ pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64,
             2 => evaluate_powers::<2>(coefficients, theta, y),
             3 => evaluate_powers::<3>(coefficients, theta, y),
             4 => evaluate_powers::<4>(coefficients, theta, y),
-            _ => {
-                y.fill(0.0);
-                for row in coefficients.chunks_exact(n).rev() {
-                    for (y, c) in y.iter_mut().zip(row) {
-                        *y = *y * theta + c;
-                    }
+            _ => evaluate_in_blocks(coefficients, theta, y),
+        },
+    }
+}
+
+/// Horner's scheme for many states, some at a time.
+fn evaluate_in_blocks(coefficients: &[f64], theta: f64, y: &mut [f64]) {
+    const BLOCK: usize = 4;
+    let n = y.len();
+    let (blocks, rest) = y.as_chunks_mut::<BLOCK>();
+    for (first, block) in (0..).step_by(BLOCK).zip(blocks) {
+        let mut value = [0.0; BLOCK];
+        for row in coefficients.chunks_exact(n).rev() {
+            if let Some(row) = row[first..].first_chunk::<BLOCK>() {
+                for i in 0..BLOCK {
+                    value[i] = value[i] * theta + row[i];
                 }
             }
-        },
+        }
+        *block = value;
+    }
+    let first = n - rest.len();
+    for (i, y) in (first..).zip(rest) {
+        let column = coefficients[i..].iter().step_by(n);
+        *y = column.rev().fold(0.0, |value, c| value * theta + c);
     }
 }
 
@@ -239,4 +255,25 @@ fn evaluate_nested(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
 fn nested(r: &[f64; 6], theta: f64) -> f64 {
     let u = 1.0 - theta;
     r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * r[5]))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{evaluate, Basis};
+
+    #[test]
+    fn columns_are_evaluated_one_like_another() {
+        for n in 1..=11 {
+            let coefficients: Vec<f64> = (0..6 * n)
+                .map(|k| f64::from(k as u32 * 37 % 11) - 5.0)
+                .collect();
+            let (mut all, mut one) = (vec![f64::NAN; n], [f64::NAN]);
+            evaluate(Basis::Powers, &coefficients, n, 0.7, &mut all);
+            for (i, value) in all.iter().enumerate() {
+                let column: Vec<f64> = coefficients[i..].iter().step_by(n).copied().collect();
+                evaluate(Basis::Powers, &column, 1, 0.7, &mut one);
+                assert_eq!(*value, one[0]);
+            }
+        }
+    }
 }

@@ -65,7 +65,13 @@ impl Taylor {
     fn longest_for_functions(&self, jets: &MotionJets, options: &Options, reach: f64) -> f64 {
         let order = self.order();
         let mut longest = f64::INFINITY;
-        for place in self.step().end.len()..jets.width() {
+        // Of several multipliers the exit functions of both ends have the same terms but for their signs.
+        let of_several = jets.exit(2).and(jets.exit(0));
+        let is_other_end = |place: &usize| {
+            of_several.is_some_and(|first| *place > first && (place - first) % 2 == 1)
+        };
+        let places = self.step().end.len()..jets.width();
+        for place in places.filter(|place| !is_other_end(place)) {
             let size = self.function_scale(jets, options, place, reach);
             let terms = [order - 1, order].map(|k| (self.coefficient(place, k).abs(), k));
             if terms.iter().any(|(c, _)| c.is_nan()) {

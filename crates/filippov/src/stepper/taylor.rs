@@ -261,29 +261,43 @@ impl Taylor {
     }
 
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
-    /// theta there.
+    /// theta there; some states at a time.
     fn sum(&mut self, y: &[f64]) {
-        let (n, dt) = (self.n, self.step.interpolant.dt);
-        let (first, rest) = self.step.interpolant.coefficients_mut().split_at_mut(n);
-        first.copy_from_slice(y);
+        const BLOCK: usize = 4;
+        let in_blocks = self.n - self.n % BLOCK;
+        for first in (0..in_blocks).step_by(BLOCK) {
+            self.sum_columns::<BLOCK>(y, first);
+        }
+        for state in in_blocks..self.n {
+            self.sum_columns::<1>(y, state);
+        }
+    }
+
+    /// The same for `N` states from this one on.
+    fn sum_columns<const N: usize>(&mut self, y: &[f64], first: usize) {
+        let (n, dt, own) = (self.n, self.step.interpolant.dt, first..first + N);
+        let scaled = self.step.interpolant.coefficients_mut();
+        scaled[own.clone()].copy_from_slice(&y[own.clone()]);
         let mut power = dt;
-        let rows = self.rows.chunks_exact(self.width).skip(1);
-        for (to, from) in rest.chunks_exact_mut(n).zip(rows) {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = from * power;
+        let rows = self.rows[self.width..].chunks_exact(self.width);
+        for (to, from) in scaled[n..].chunks_exact_mut(n).zip(rows) {
+            let columns = to[first..].first_chunk_mut::<N>();
+            if let (Some(to), Some(from)) = (columns, from[first..].first_chunk::<N>()) {
+                *to = from.map(|c| c * power);
             }
             power *= dt;
         }
-        self.step.end.fill(0.0);
-        self.defect.fill(0.0);
-        let rows = self.step.interpolant.coefficients().chunks_exact(n);
-        for (k, row) in rows.enumerate().rev() {
-            let sums = self.step.end.iter_mut().zip(&mut self.defect);
-            for ((y1, slope), c) in sums.zip(row) {
-                *y1 += c;
-                *slope += k as f64 * c;
+        let (mut y1, mut slope) = ([0.0; N], [0.0; N]);
+        for (k, row) in scaled.chunks_exact(n).enumerate().rev() {
+            if let Some(row) = row[first..].first_chunk::<N>() {
+                for i in 0..N {
+                    y1[i] += row[i];
+                    slope[i] += k as f64 * row[i];
+                }
             }
         }
+        self.step.end[own.clone()].copy_from_slice(&y1);
+        self.defect[own].copy_from_slice(&slope);
     }
 
     /// As [`sum`](Self::sum), for few states: they stay in registers.

@@ -45,7 +45,7 @@ pub const LARGEST_SERIES_BLOCK: usize = 32;
 
 /// Sliding on so many surfaces is integrated by series unless a method is named. All exit functions are searched
 /// along the whole step: with more of them the short steps of a Runge-Kutta method are cheaper.
-pub const MOST_AUTO_SERIES: usize = 5;
+pub const MOST_AUTO_SERIES: usize = 10;
 
 /// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
 pub const TAYLOR_DEAR: usize = 2000;

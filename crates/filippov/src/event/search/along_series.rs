@@ -53,22 +53,30 @@ impl StepSearch<'_, '_> {
         self.stepper.interpolant().coefficients().len() / self.run.x.len()
     }
 
-    /// The series of a guard in this step, into `rows`: how it stands for the guard, if it does, and whether there is one.
+    /// The series of a guard in this step, into `rows`, and how it stands for the guard; `None` if it does not.
     pub(super) fn series_along(
         &mut self,
         m: &Monitored,
         rows: &mut [f64],
         value_at_end: f64,
-    ) -> Result<(Option<Likeness>, bool), FieldError> {
+    ) -> Result<Option<Likeness>, FieldError> {
         if self.is_polynomial(m) {
             self.affine_series(m, rows)?;
-            return Ok((Some(Likeness::EXACT), false));
+            return Ok(Some(Likeness::EXACT));
         }
-        let Some(known) = self.exit_series(m, rows) else {
-            return Ok((None, false));
-        };
-        let likeness = self.likeness_of_exit(m, known, &Series::new(rows), value_at_end)?;
-        Ok((likeness, true))
+        let sticks = |j: &usize| self.run.system.sticks_at(*j);
+        // Where the motion sticks its limits are others than those of the series.
+        if !matches!(self.run.motion.field, ModeField::Sliding(_))
+            || m.deflation.is_some()
+            || !self.run.motion.is_straight
+            || self.run.motion.sliding().iter().any(sticks)
+        {
+            return Ok(None);
+        }
+        match self.exit_series(m, rows) {
+            Some(known) => self.likeness_of_exit(m, known, &Series::new(rows), value_at_end),
+            None => Ok(None),
+        }
     }
 
     /// A polynomial along the step, with what is to be divided out.
@@ -103,7 +111,7 @@ impl StepSearch<'_, '_> {
     }
 
     /// An exit function along the step, as far as its series describes it, into `rows`; `None` if there is none.
-    fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> Option<ExitSeries> {
+    pub(super) fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> Option<ExitSeries> {
         let known = self.stepper.exit_series(m.exit()?, rows)?;
         rows[0] += self.slacks.of(m.guard);
         Some(known)
@@ -117,15 +125,6 @@ impl StepSearch<'_, '_> {
         series: &Series,
         value_at_end: f64,
     ) -> Result<Option<Likeness>, FieldError> {
-        let sticks = |j: &usize| self.run.system.sticks_at(*j);
-        // Where the motion sticks its limits are others than those of the series.
-        if !matches!(self.run.motion.field, ModeField::Sliding(_))
-            || m.deflation.is_some()
-            || !self.run.motion.is_straight
-            || self.run.motion.sliding().iter().any(sticks)
-        {
-            return Ok(None);
-        }
         if known.is_affine {
             let is_exact = series.leads_between(m.value, value_at_end);
             return Ok(is_exact.then_some(Likeness::EXACT));

@@ -109,10 +109,9 @@ impl StepSearch<'_, '_> {
         let reach = sought.reach;
         let mut buffer = NO_TERMS;
         let rows = &mut buffer[..self.n_rows()];
-        let (likeness, has_series) = self.series_along(&m, rows, value)?;
         let mut polynomial = Polynomial::None;
         let mut near = None;
-        if let Some(likeness) = likeness {
+        if let Some(likeness) = self.series_along(&m, rows, value)? {
             let along = self.as_polynomial(&m, rows);
             if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &along {
                 let margin = likeness.margin;
@@ -146,11 +145,9 @@ impl StepSearch<'_, '_> {
             if likeness.is_exact {
                 polynomial = along;
             }
-        } else if has_series {
-            near = Series::new(rows).near_zero();
         }
         if let Polynomial::None = polynomial {
-            return self.search_bounded(index, (value, has_series), near, proof, sought);
+            return self.search_bounded(index, value, proof, sought);
         }
         self.search_near((index, true), &polynomial, near, sought)
     }
@@ -159,16 +156,17 @@ impl StepSearch<'_, '_> {
     fn search_bounded(
         &mut self,
         index: usize,
-        (value_at_end, has_series): (f64, bool),
-        near: Option<Near>,
+        value_at_end: f64,
         proof: Option<Proof>,
         sought: &mut Sought,
     ) -> Result<(Search, f64), FieldError> {
         let m = self.run.motion.monitored[index];
+        let mut buffer = NO_TERMS;
+        let rows = &mut buffer[..self.n_rows()];
         // Beyond zero at the end: there is a zero, whether there are bounds or not.
         let proof = match proof {
             Some(proof) => proof,
-            None if value_at_end <= 0.0 && has_series => Proof::Open,
+            None if value_at_end <= 0.0 && self.exit_series(&m, rows).is_some() => Proof::Open,
             None => self.prove_clear(index, value_at_end, sought.reach),
         };
         if proof == Proof::Silent && !self.exit_may_vanish(&m) {
@@ -178,6 +176,8 @@ impl StepSearch<'_, '_> {
         if proof == Proof::Clear {
             return Ok((Search::Nothing, sought.reach));
         }
+        let known = self.exit_series(&m, rows);
+        let near = known.and_then(|_| Series::new(rows).near_zero());
         let bounded = (index, proof == Proof::Open);
         self.search_near(bounded, &Polynomial::None, near, sought)
     }
