@@ -4,6 +4,7 @@ use filippov_expr::{Enclosure, Interval, Motion};
 use smallvec::SmallVec;
 
 use crate::options::{Method, Options};
+use crate::page::IS_PAGE;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{BOX_GROWTH, CLEAR_IN_BOX, FEWEST_ASLEEP, MOST_CHOSEN_SERIES};
 
@@ -45,13 +46,13 @@ impl Asleep {
     /// May surfaces be asleep?
     #[inline(always)]
     pub fn is_used(&self) -> bool {
-        self.is_used
+        !IS_PAGE && self.is_used
     }
 
     /// Is any asleep?
     #[inline(always)]
     pub fn has_any(&self) -> bool {
-        self.awake.len() < self.sides.len()
+        !IS_PAGE && self.awake.len() < self.sides.len()
     }
 
     /// The others, in order.
