@@ -3,8 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, message_of, not_finite, EndOnly, Held, Method, Mode, Segment, Side, Solution,
-    Stats, Stop,
+    as_multiplier, message_of, not_finite, Held, Method, Mode, Segment, Side, Solution, Stats, Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -99,15 +98,6 @@ impl Run {
     /// Did the caller stop it?
     pub fn was_interrupted(&self) -> bool {
         matches!(self.solution().stop, Stop::Interrupted)
-    }
-
-    /// Its end, and whether its field was native code, if that with its system is all that is left of it.
-    pub fn end_only(&self) -> Option<(EndOnly, bool)> {
-        if self.error.is_some() || self.derivatives.is_some() || !self.prepared.is_plain() {
-            return None;
-        }
-        let end = EndOnly::of(&self.solution())?;
-        Some((end, self.prepared.is_native()))
     }
 
     /// The last time reached.

@@ -2,13 +2,17 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use filippov::EndOnly;
+use filippov::{EndOnly, Solution};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
+use crate::derivatives::{Failure, RunDerivatives};
 use crate::prepared_run::PreparedRun;
-use crate::run::Run;
+use crate::run::{is_interruption, Run};
+
+/// A run with the derivatives that were wanted of it.
+pub type Outcome = Result<(Solution, Option<RunDerivatives>), Failure>;
 
 /// The runs of an ensemble, in the order of its members.
 #[pyclass(frozen, module = "filippov._core")]
@@ -35,6 +39,32 @@ struct Lean {
     is_native: bool,
 }
 
+/// What a thread hands over of a run: where that is all that is kept, its end. The record goes where it was made, so that the next
+/// run of the thread takes its place.
+pub enum Finished {
+    End(EndOnly),
+    Whole(Box<Outcome>),
+}
+
+impl Finished {
+    /// What is kept of the run of a prepared one.
+    pub fn of(prepared: &PreparedRun, outcome: Outcome) -> Self {
+        let end = match &outcome {
+            Ok((solution, None)) if prepared.is_plain() => EndOnly::of(solution),
+            _ => None,
+        };
+        end.map_or_else(|| Finished::Whole(Box::new(outcome)), Finished::End)
+    }
+
+    /// Was it stopped by an exception that asks for the end of all?
+    pub fn is_interruption(&self) -> bool {
+        let Finished::Whole(outcome) = self else {
+            return false;
+        };
+        matches!(&**outcome, Ok((solution, _)) if is_interruption(solution))
+    }
+}
+
 impl Runs {
     fn members(&self) -> std::sync::MutexGuard<'_, Members> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -48,15 +78,24 @@ impl Runs {
         members.systems.push((first, system.clone().unbind(), t0));
     }
 
-    /// Adds a run, whose parameters are `p`. What is left of it is `end`, if that is all.
-    pub fn push(&self, py: Python<'_>, run: Run, p: Vec<f64>) -> PyResult<()> {
-        let member = match run.end_only() {
-            Some((end, is_native)) => Member::Lean(Box::new(Lean {
+    /// Adds a run of a prepared one, whose parameters are `p`.
+    pub fn push(
+        &self,
+        py: Python<'_>,
+        prepared: PreparedRun,
+        finished: Finished,
+        p: Vec<f64>,
+    ) -> PyResult<()> {
+        let member = match finished {
+            Finished::End(end) => Member::Lean(Box::new(Lean {
                 end,
                 p: p.into(),
-                is_native,
+                is_native: prepared.is_native(),
             })),
-            None => Member::Whole(Py::new(py, run)?),
+            Finished::Whole(outcome) => {
+                let (solution, derivatives) = (*outcome).map_err(PyErr::from)?;
+                Member::Whole(Py::new(py, prepared.result(solution, derivatives))?)
+            }
         };
         self.members().list.push(member);
         Ok(())

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::derivative::Extension;
 use filippov::{
-    Clock, Keep, Method, Mode, NonUnique, Options, Reached, SlidingRule, Solution, Stabilization,
+    Clock, Keep, Method, Mode, NonUnique, Options, Reached, SlidingRule, Stabilization,
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -12,14 +12,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::clock::ManualClock;
-use crate::derivatives::{Failure, RunDerivatives, Wanted};
+use crate::derivatives::Wanted;
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
-use crate::run::{is_interruption, Run};
-use crate::runs::Runs;
+use crate::run::Run;
+use crate::runs::{Finished, Runs};
 use crate::systems::TracedSystem;
 use crate::threads::{on_threads, Report, CHUNK_PER_THREAD, POLL_EVERY};
-
-type Outcome = Result<(Solution, Option<RunDerivatives>), Failure>;
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
 #[pyclass(frozen, module = "filippov._core")]
@@ -124,20 +122,18 @@ pub fn solve_many(
         };
         let prepared = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
         let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(Reached) -> bool| {
-            job.run_differentiated((t0, t1), &options.options, wanted, interrupt)
+            let outcome = job.run_differentiated((t0, t1), &options.options, wanted, interrupt);
+            Finished::of(job, outcome)
         };
-        let is_last =
-            |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
         let report = Report {
             function: options.progress.as_ref(),
             before: runs.len() - first,
         };
-        let done = py.detach(|| on_threads(&prepared, threads, &report, run, is_last));
+        let done =
+            py.detach(|| on_threads(&prepared, threads, &report, run, Finished::is_interruption));
         let is_cut = done.results.len() < prepared.len();
-        for ((prepared, outcome), &row) in prepared.into_iter().zip(done.results).zip(chunk) {
-            let (solution, derivatives) = outcome.map_err(PyErr::from)?;
-            let run = prepared.result(solution, derivatives);
-            runs.push(py, run, p.row(row).to_vec())?;
+        for ((prepared, finished), &row) in prepared.into_iter().zip(done.results).zip(chunk) {
+            runs.push(py, prepared, finished, p.row(row).to_vec())?;
         }
         let raised = done.raised.or_else(|| py.check_signals().err());
         let raised = raised.or_else(|| {

@@ -1,6 +1,7 @@
 //! Modes: a region of smooth motion, or sliding on a set of surfaces.
 
 use std::fmt;
+use std::sync::Arc;
 
 use smallvec::SmallVec;
 
@@ -18,8 +19,12 @@ const SHORT: usize = 15;
 /// The entries of a mode. Beyond `length` short ones are zero, so that equal modes are equal as a whole.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Entries {
-    Short { length: u8, entries: [i8; SHORT] },
-    Long(Box<[i8]>),
+    Short {
+        length: u8,
+        entries: [i8; SHORT],
+    },
+    /// Shared by all copies, of which a run keeps several of every switch.
+    Long(Arc<[i8]>),
 }
 
 impl Default for Mode {
@@ -59,7 +64,7 @@ impl Mode {
     fn entries_mut(&mut self) -> &mut [i8] {
         match &mut self.0 {
             Entries::Short { length, entries } => &mut entries[..usize::from(*length)],
-            Entries::Long(entries) => entries,
+            Entries::Long(entries) => Arc::make_mut(entries),
         }
     }
 
@@ -124,15 +129,22 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
+        let mut signs = match self.entries().len() {
+            few @ ..=FEW => Signs::from_buf_and_len([1.0; FEW], few),
+            many => Signs::from_elem(1.0, many),
+        };
+        self.write_signs(&mut signs);
+        signs
+    }
+
+    /// The same in the place of others.
+    #[inline]
+    pub(crate) fn write_signs(&self, signs: &mut Signs) {
         let entries = self.entries();
-        if entries.len() > FEW {
-            return Signs::from_vec(entries.iter().map(|&entry| sign_of(entry)).collect());
-        }
-        let mut signs = Signs::from_buf_and_len([1.0; FEW], entries.len());
+        signs.resize(entries.len(), 1.0);
         for (sign, &entry) in signs.iter_mut().zip(entries) {
             *sign = sign_of(entry);
         }
-        signs
     }
 
     /// Sets entry `j`.

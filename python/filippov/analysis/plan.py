@@ -41,6 +41,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST_IN_CHUNK = 4096
 _CHUNKS = 50
+_LEAST_PER_THREAD = 16
 
 
 class Chunk(NamedTuple):
@@ -181,9 +182,10 @@ class Plan(NamedTuple):
             for start in range(0, line, chunk_size)
         ]
 
-    def usual_chunk_size(self) -> int:
-        """Return the number of points of a chunk if none is asked for."""
-        return min(max(-(-self.n_points // _CHUNKS), 1), _MOST_IN_CHUNK)
+    def usual_chunk_size(self, threads: int = 1) -> int:
+        """Return the number of points of a chunk if none is asked for; `threads` wait for one another at its end."""
+        least = 1 if threads == 1 else _LEAST_PER_THREAD * threads
+        return min(max(-(-self.n_points // _CHUNKS), least), _MOST_IN_CHUNK)
 
     def points(self, start: int, stop: int) -> tuple[Array, Array, Array, Array]:
         """Return initial states, parameters, clocks and spans of some points, one row for each."""

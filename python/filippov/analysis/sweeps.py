@@ -263,7 +263,8 @@ def run_plan(
         from filippov.analysis.store import run_with_store
 
         return run_with_store(plan, store, executor, count, chunk_size, chosen, progress)
-    pieces = plan.pieces(int(chunk_size or plan.usual_chunk_size()))
+    waiting = 1 if executor is not None or plan.follows or progress else count
+    pieces = plan.pieces(int(chunk_size or plan.usual_chunk_size(waiting)))
     tables: list[Table | None] = [None] * len(pieces)
     carries: dict[int, Any] = {}
     bar = Progress(progress, plan.n_points)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::far_ends::FarEnds;
-use super::known_modes::KnownModes;
+use super::known_modes::{KnownModes, OwnJets};
 use super::{
     AffineBounds, Asleep, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField,
     SlidingSet, Triggers,
@@ -122,7 +122,7 @@ impl<'a> CurrentMotion<'a> {
         for j in mode.sliding_set() {
             self.sliding.push(j);
         }
-        self.signs = mode.signs();
+        mode.write_signs(&mut self.signs);
         self.mode = mode;
         self.t_start = t_start;
         self.affine_bounds = None;
@@ -203,7 +203,7 @@ impl<'a> CurrentMotion<'a> {
         &mut self,
         system: &dyn PiecewiseSystem,
         find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
-    ) -> Option<Arc<MotionJets>> {
+    ) -> Option<OwnJets> {
         match &self.known.present().jets {
             Some(Some(jets)) => Some(Arc::clone(jets)),
             Some(None) => None,
@@ -217,9 +217,9 @@ impl<'a> CurrentMotion<'a> {
         &mut self,
         system: &dyn PiecewiseSystem,
         find: impl FnOnce(&[usize], Option<&[usize]>) -> Option<Arc<MotionJets>>,
-    ) -> Option<Arc<MotionJets>> {
+    ) -> Option<OwnJets> {
         let awake = self.asleep.curved_awake(system);
-        let found = find(&self.sliding, awake.as_deref());
+        let found = find(&self.sliding, awake.as_deref()).map(Arc::new);
         self.known.present().jets = Some(found.clone());
         found
     }

@@ -11,6 +11,9 @@ use crate::system::{MotionJets, PiecewiseSystem};
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
 
+/// The series of a mode, counted by the run itself: threads that share them would wait for one another at every motion.
+pub(crate) type OwnJets = Arc<Arc<MotionJets>>;
+
 /// The surfaces whose sign matters in a mode.
 #[derive(Clone, Debug)]
 pub(crate) struct ActiveSurfaces {
@@ -80,7 +83,7 @@ pub(super) struct KnownMode {
     mode: Mode,
     active: ActiveSurfaces,
     /// Its Taylor series, once they were asked for and if there are any.
-    pub jets: Option<Option<Arc<MotionJets>>>,
+    pub jets: Option<Option<OwnJets>>,
     /// What is monitored, where nothing rests and there is no contact.
     pub monitored: Option<SmallVec<[Monitored; 2]>>,
 }

@@ -40,7 +40,7 @@ pub(crate) use duties::Exits;
 pub use duties::Motion;
 pub use guard::{Guard, RootEnd};
 pub use intersection::IntersectionField;
-pub(crate) use known_modes::ActiveSurfaces;
+pub(crate) use known_modes::{ActiveSurfaces, OwnJets};
 pub(crate) use leading::first_nonzero_of_both;
 pub use leading::{first_nonzero, normal_component, Leading};
 pub use meeting::MeetingFields;

@@ -1,15 +1,12 @@
 //! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
 
-use std::sync::Arc;
-
 use smallvec::SmallVec;
 
 use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::motion::SmoothField;
+use crate::motion::{OwnJets, SmoothField};
 use crate::powers::power;
-use crate::system::MotionJets;
 use crate::tolerances::{
     ERRORS_OF_STEPS, TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP,
     TAYLOR_ORDER_DEAR, TAYLOR_SLOW, TAYLOR_UNDERFLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
@@ -18,7 +15,7 @@ use crate::tolerances::{
 /// The series of the present motion.
 #[derive(Clone, Default)]
 pub(super) struct MotionSeries {
-    pub(super) jets: Option<Arc<MotionJets>>,
+    pub(super) jets: Option<OwnJets>,
     /// How long a step the series allows that was taken at the start of the motion, until the step.
     pub(super) reach: Option<f64>,
     /// The user was warned that a motion has no series.
