@@ -183,7 +183,7 @@ class Plan(NamedTuple):
         ]
 
     def usual_chunk_size(self, threads: int = 1) -> int:
-        """Return the number of points of a chunk if none is asked for; `threads` wait for one another at its end."""
+        """Return the usual number of points of a chunk, at whose end so many threads wait for one another."""
         least = 1 if threads == 1 else _LEAST_PER_THREAD * threads
         return min(max(-(-self.n_points // _CHUNKS), least), _MOST_IN_CHUNK)
 
