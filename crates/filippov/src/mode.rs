@@ -195,7 +195,7 @@ impl fmt::Debug for Mode {
 mod tests {
     use super::Mode;
 
-    /// Modes of up to 40 surfaces, with entries from the digits of a number to base 3.
+    /// Modes of up to 40 surfaces, with entries as a generator of random numbers has them.
     fn modes() -> impl Iterator<Item = Vec<i8>> {
         (0..600_u64).map(|k| {
             let mut state = k.wrapping_mul(6_364_136_223_846_793_005);
