@@ -137,7 +137,7 @@ impl Mode {
         signs
     }
 
-    /// The same in the place of others.
+    /// Writes the signs handed to the field over those of another mode.
     #[inline]
     pub(crate) fn write_signs(&self, signs: &mut Signs) {
         let entries = self.entries();

@@ -41,6 +41,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST_IN_CHUNK = 4096
 _CHUNKS = 50
+# Threads wait for one another at the end of a chunk: it has so many points for each of them at least.
 _LEAST_PER_THREAD = 16
 
 

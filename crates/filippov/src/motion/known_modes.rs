@@ -8,7 +8,7 @@ use super::{Asleep, Monitored};
 use crate::mode::{Mode, Signs};
 use crate::system::{MotionJets, PiecewiseSystem};
 
-/// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
+/// A run remembers so many modes. When it meets one more it forgets them all, and finds again what follows from each.
 const MOST_KNOWN: usize = 8;
 
 /// The series of a mode, counted by the run itself: threads that share them would wait for one another at every motion.
