@@ -218,3 +218,13 @@ def test_no_events_is_none_and_empty_is_empty() -> None:
     sol = fl.solve_ivp(pendulum, (0, 1), [1.0, 0.0], events=lambda t, y: y[0] + 9.0)
     assert [times.shape for times in sol.t_events] == [(0,)]
     assert fl.solve_ivp(pendulum, (0, 1), [1.0, 0.0], events=[]).t_events == []
+
+
+def test_events_that_can_be_read_once_are_all_found() -> None:
+    system = fl.System(pendulum, n=2)
+    expected = system.solve((0, 10), [1.0, 0.0], events=[lambda t, y: y[0] - 0.2]).t_events
+    for options in ({}, {"t_eval": [0.0, 1.0]}):
+        once = (event for event in [lambda t, y: y[0] - 0.2])
+        found = system.solve((0, 10), [1.0, 0.0], events=once, **options).t_events
+        assert len(expected[0]) > 1
+        np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)

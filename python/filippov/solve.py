@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -258,12 +258,15 @@ def solve_prepared(
     if "events" in options:
         options = dict(options)
         events = options.pop("events")
-    if not options.keys() <= _OPTIONS:
-        return solve_ivp(system, t_span, y0, events=events, params=params, **options)
+        if isinstance(events, Iterator):
+            events = list(events)  # they are read twice
     specs = normalise_events(events)
     key = None if params else _key_of(options, specs)
     call = None if key is None else system._calls.get(key)
-    if call is not None:
+    if call is None:
+        if not options.keys() <= _OPTIONS:
+            return solve_ivp(system, t_span, y0, events=events, params=params, **options)
+    else:
         (t0, t1), state = check_t_span(t_span), check_y0(y0, states=system._states)
         prepared = call.prepared
         if t0 < t1 and len(state) == prepared.core.n_states:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -336,12 +337,10 @@ class System(Points, Saving):
         -------
         Solution
         """
-        from filippov.solve import solve_prepared
-
         if self._params:
             named = {name: options.pop(name) for name in self._params if name in options}
             params = {**(params or {}), **named}
-        return solve_prepared(self, t_span, y0, params, options)
+        return _solver()(self, t_span, y0, params, options)
 
     def ensemble(
         self,
@@ -617,6 +616,14 @@ class System(Points, Saving):
         if self._prepared is not None and self._prepared.core.n_states == n:
             return self._prepared
         return self.prepare(n, 0.0, None, self.parameter_values(None))
+
+
+@cache
+def _solver() -> Callable[..., Solution]:
+    """Return the function that `System.solve` calls; its module imports this one."""
+    from filippov.solve import solve_prepared
+
+    return solve_prepared
 
 
 def _refuse_names_given_twice(

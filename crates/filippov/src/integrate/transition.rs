@@ -496,7 +496,7 @@ impl<'a> Integrator<'a> {
     /// The derivative at the start of the motion, and its exit functions there. The state moves onto the surfaces slid on.
     fn evaluate_start(&mut self) -> Result<(), FieldError> {
         let run = &mut self.run;
-        if self.stepper.start(run) {
+        if self.stepper.start(run)? {
             // Known.
         } else if let ModeField::Region(_) = &run.motion.field {
             let place = run.motion.setting().at(run.t, &run.x);

@@ -145,6 +145,11 @@ impl<'a> SlidingField<'a> {
         2.0 * self.weight_plus(self.last_time, self.last()) - 1.0
     }
 
+    /// Takes over the guards at time t, where something else has evaluated them.
+    pub fn set_exits(&mut self, t: f64, exits: [f64; 2]) {
+        (self.exits, self.last_time) = (exits, t);
+    }
+
     /// The surface slid on.
     pub fn surface(&self) -> usize {
         self.surface

@@ -70,7 +70,7 @@ macro_rules! methods {
             }
 
             #[inline(always)]
-            fn start(&mut self, at: &mut Run) -> bool {
+            fn start(&mut self, at: &mut Run) -> Result<bool, FieldError> {
                 match self { $(Chosen::$name(method) => method.start(at)),* }
             }
 

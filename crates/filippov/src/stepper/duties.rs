@@ -86,8 +86,11 @@ pub(crate) trait Stepper {
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if it does not.
-    fn start(&mut self, _: &mut Run) -> bool {
-        false
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn start(&mut self, _: &mut Run) -> Result<bool, FieldError> {
+        Ok(false)
     }
 
     /// The field was evaluated at the start of the motion: does the method integrate it?

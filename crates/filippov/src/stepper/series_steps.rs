@@ -7,7 +7,7 @@ use super::taylor::reach as reach_of;
 use super::{Attempt, Controller, ErrorScale, ExitSeries, Step, Stepper, Taylor};
 use crate::error::FieldError;
 use crate::mode::Signs;
-use crate::motion::{observer, CurrentMotion, ModeField, Run, Seen, SmoothField};
+use crate::motion::{observer, CurrentMotion, ModeField, Motion, Run, Seen, SmoothField};
 use crate::options::{Method, Options};
 use crate::powers::power;
 use crate::status::{Warning, WarningCode};
@@ -181,27 +181,38 @@ impl Stepper for Taylor {
         }
     }
 
-    /// In a region the derivative is the first coefficient. Sliding starts with its field: next to a two-fold its series is
-    /// not accurate.
+    /// The derivative is the first coefficient. Sliding on several surfaces starts with its field: the series begins with
+    /// the multipliers that the field finds.
     #[inline(always)]
-    fn start(&mut self, at: &mut Run) -> bool {
-        if !at.motion.sliding.is_empty() {
-            return false;
-        }
+    fn start(&mut self, at: &mut Run) -> Result<bool, FieldError> {
         let Some(jets) = self.series.jets.take() else {
-            return false;
+            return Ok(false);
         };
+        match &mut at.motion.field {
+            ModeField::Region(_) => {}
+            ModeField::Sliding(field) if !field.is_at_two_fold(at.t) => {
+                field.project(at.t, &mut at.x)?;
+            }
+            _ => {
+                self.series.jets = Some(jets);
+                return Ok(false);
+            }
+        }
         let allowed = self.expand_motion(at, &jets, None);
         let is_known = !allowed.is_nan();
         if is_known {
             self.start_from_series();
             at.stats.n_field_evaluations += jets.cost();
+            if let (ModeField::Sliding(field), Some(first)) = (&mut at.motion.field, jets.exit(0)) {
+                let exits = [first, first + 1].map(|place| self.coefficient(place, 0));
+                field.set_exits(at.t, exits);
+            }
             self.series.reach = Some(self.limited_by_functions(&jets, at.options, allowed));
         } else {
             self.forget();
         }
         self.series.jets = Some(jets);
-        is_known
+        Ok(is_known)
     }
 
     /// If redundant contacts share a load their equations do not determine the multipliers: there are no series.

@@ -85,7 +85,10 @@ impl Steppers {
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if the method does not.
-    pub fn start(&mut self, at: &mut Run) -> bool {
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn start(&mut self, at: &mut Run) -> Result<bool, FieldError> {
         of_method_in_use!(mut self.start(at))
     }
 
