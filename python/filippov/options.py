@@ -99,6 +99,7 @@ _REPEATABLE = frozenset(
         *("sliding", "nonunique", "keep", "dense_output"),
     )
 )
+_FLOATS = frozenset({float})
 _PLAIN = frozenset({str, float, int, bool, SlidingPolicy})
 _KNOWN: dict[tuple[Any, ...] | None, Options] = {}
 _MOST_KNOWN = 64
@@ -109,7 +110,7 @@ def repeatable_key(given: Mapping[str, Any]) -> tuple[Any, ...] | None:
     types = [*map(type, given.values())]
     # With the types: 1, 1.0 and True are equal.
     is_plain = _REPEATABLE.issuperset(given) and _PLAIN.issuperset(types)
-    return (*given.items(), *types) if is_plain else None
+    return (*given, *given.values(), *types) if is_plain else None
 
 
 def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
@@ -212,7 +213,7 @@ def check_y0(y0: Any, name: str = "y0", states: Sequence[str] | None = None) -> 
     InputError
         If `y0` is not one-dimensional, empty, complex, or not finite, or a name is missing or unknown.
     """
-    if type(y0) in (list, tuple) and {*map(type, y0)} == {float} and math.isfinite(sum(y0)):
+    if type(y0) in (list, tuple) and _FLOATS.issuperset(map(type, y0)) and y0 and math.isfinite(sum(y0)):
         return np.array(y0)
     if isinstance(y0, Mapping):
         y0 = in_order(y0, name, states)

@@ -288,7 +288,7 @@ class Solution:
         -------
         Solution
         """
-        solution = cls()
+        solution = cls.__new__(cls)  # it has no fields yet
         solution._run = run
         solution._origin = _Origin(
             system, prepared, values, t0, states, has_events, dense_output, wanted, events

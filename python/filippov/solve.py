@@ -276,7 +276,7 @@ def solve_prepared(
             run = run_core(
                 prepared.core, t0, t1, state, call.parameters, core_options, call.events, actions, asked
             )
-            if run.reason != "field_not_finite":
+            if run.status >= 0 or run.reason != "field_not_finite":
                 solution = _present(
                     run, system, prepared, call.options, t0, call.states, specs, None, (), wanted
                 )
@@ -468,6 +468,24 @@ def _present(
         wanted=wanted,
         events=tuple(specs or ()),
     )
+    has_failed = run.status < 0
+    if has_failed:
+        _add_to_message(solution, run, system, values, functions)
+    if options.progress is not None:
+        _report_end(options.progress, run, solution)
+    if has_failed:
+        _raise_if_asked(run, solution, options)
+    return solution
+
+
+def _add_to_message(
+    solution: Solution,
+    run: AnyRun,
+    system: System,
+    values: dict[str, float] | None,
+    functions: Sequence[tuple[str, Any]],
+) -> None:
+    """Name the line of the field that is not finite, or the function that raised."""
     if run.reason == "field_not_finite" and isinstance(run, Run):
         given = system.parameter_values(None) if values is None else values
         solution.message += system.line_not_finite(run, given)
@@ -476,11 +494,6 @@ def _present(
         raising = raised_by(run.error, [*own, *functions])
         if raising:
             solution.message = solution.message.replace("the right-hand side", raising, 1)
-    if options.progress is not None:
-        _report_end(options.progress, run, solution)
-    if run.status < 0:
-        _raise_if_asked(run, solution, options)
-    return solution
 
 
 def _report_end(report: Report, run: AnyRun, solution: Solution) -> None:

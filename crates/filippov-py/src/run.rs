@@ -68,7 +68,7 @@ pub struct Run {
     error: Option<PyErr>,
     /// The surfaces that a user sees are the first so many.
     n_visible: usize,
-    derivatives: Option<RunDerivatives>,
+    derivatives: Option<Box<RunDerivatives>>,
 }
 
 impl Run {
@@ -83,7 +83,7 @@ impl Run {
             prepared,
             solution: Mutex::new(solution),
             error,
-            derivatives,
+            derivatives: derivatives.map(Box::new),
         }
     }
 
