@@ -18,7 +18,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-ALLOCATORS = re.compile(r"^cfn=\(\d+\) (malloc|calloc|realloc|posix_memalign|aligned_alloc)$")
+ALLOCATORS = re.compile(
+    r"^cfn=\(\d+\) (malloc|calloc|realloc|posix_memalign|aligned_alloc|mi_(malloc|zalloc|realloc)_aligned)$"
+)
 STEADY = 0.01  # largest difference of the two halves of the counted runs
 
 

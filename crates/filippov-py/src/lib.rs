@@ -12,6 +12,7 @@ mod exponents;
 mod inspect;
 mod itineraries;
 mod laws;
+mod memory;
 mod page;
 mod prepared_run;
 mod regions;
@@ -24,6 +25,9 @@ mod systems;
 mod threads;
 
 use pyo3::prelude::*;
+
+#[global_allocator]
+static MEMORY: memory::BySize = memory::BySize;
 
 /// The compiled core of `filippov`.
 #[pymodule]

@@ -35,8 +35,8 @@ pub const MOST_SHORTENINGS: usize = 4;
 
 /// Orders of Taylor steps per decimal digit of the relative tolerance, and beside that: where the coefficients are
 /// cheap, and where they are dear. The least work on coefficients per unit of time takes 1.15 per digit (Jorba and
-/// Zou); a step has costs of its own, and longer ones pay: most where steps are few.
-pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (1.7, 5.6);
+/// Zou); a step has costs of its own, and longer ones pay.
+pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (2.5, 3.0);
 /// The same where the coefficients are dear.
 pub const TAYLOR_ORDER_DEAR: (f64, f64) = (1.5, 2.0);
 
@@ -54,8 +54,9 @@ pub const TAYLOR_DEAR: usize = 2000;
 /// have made.
 pub const PIECES_OF_SERIES: u32 = 8;
 
-/// Highest order of a Taylor step: beyond it rounding limits the error, and not the step.
-pub const TAYLOR_LARGEST_ORDER: usize = 24;
+/// Highest order of a Taylor step. On problems of the papers order 24 is no faster at any tolerance down to 1e-13,
+/// and 2 % slower at 1e-9: most steps end at a switch.
+pub const TAYLOR_LARGEST_ORDER: usize = 21;
 
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
