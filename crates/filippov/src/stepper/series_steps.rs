@@ -181,16 +181,22 @@ impl Stepper for Taylor {
         }
     }
 
-    /// The derivative is the first coefficient. Sliding on several surfaces starts with its field: the series begins with
-    /// the multipliers that the field finds.
+    /// The derivative is the first coefficient, and of sliding on one surface the exit functions are those of the series.
+    /// Sliding on several starts with its field: the series begins with the multipliers that the field finds.
     #[inline(always)]
     fn start(&mut self, at: &mut Run) -> Result<bool, FieldError> {
         let Some(jets) = self.series.jets.take() else {
             return Ok(false);
         };
+        let first_exit = jets.exit(0);
         match &mut at.motion.field {
             ModeField::Region(_) => {}
-            ModeField::Sliding(field) if !field.is_at_two_fold(at.t) => {
+            // Where the motion sticks its limits are others than those of the series.
+            ModeField::Sliding(field)
+                if first_exit.is_some()
+                    && !at.system.sticks_at(field.surface())
+                    && !field.is_at_two_fold(at.t) =>
+            {
                 field.project(at.t, &mut at.x)?;
             }
             _ => {
@@ -203,7 +209,7 @@ impl Stepper for Taylor {
         if is_known {
             self.start_from_series();
             at.stats.n_field_evaluations += jets.cost();
-            if let (ModeField::Sliding(field), Some(first)) = (&mut at.motion.field, jets.exit(0)) {
+            if let (ModeField::Sliding(field), Some(first)) = (&mut at.motion.field, first_exit) {
                 let exits = [first, first + 1].map(|place| self.coefficient(place, 0));
                 field.set_exits(at.t, exits);
             }
