@@ -52,7 +52,7 @@ fn plain_stage<const N: usize, const R: usize>(
     rates: [&[f64]; R],
 ) {
     let n = if N == ANY { y.len() } else { N };
-    let (out, y, rates) = (&mut out[..n], &y[..n], rates.map(|k| &k[..n]));
+    let (out, y, rates) = (&mut out[..n], &y[..n], shortened(rates, n));
     for i in 0..n {
         out[i] = y[i] + dt * dot(weights, rates.map(|k| k[i]));
     }
@@ -100,7 +100,7 @@ fn plain_squared_error<const N: usize, const R: usize>(
     rates: [&[f64]; R],
 ) -> f64 {
     let n = if N == ANY { y.len() } else { N };
-    let (y, y1, rates) = (&y[..n], &y1[..n], rates.map(|k| &k[..n]));
+    let (y, y1, rates) = (&y[..n], &y1[..n], shortened(rates, n));
     let (mut sum, mut first) = (0.0, 0);
     if N == ANY {
         let [y, y1, atol] = [y, y1, scale.atol()].map(in_blocks);
@@ -151,6 +151,15 @@ fn short_squared_error(
 fn short_dot(i: usize, (weights, rates): (&[f64], &[&[f64]])) -> f64 {
     let terms = weights.iter().zip(rates).map(|(w, k)| w * k[i]);
     terms.reduce(|sum, term| sum + term).unwrap_or_default()
+}
+
+/// The first n entries of each. A loop, as the compiler calls the closure of `map` instead.
+#[inline(always)]
+fn shortened<const R: usize>(mut rates: [&[f64]; R], n: usize) -> [&[f64]; R] {
+    for k in &mut rates {
+        *k = &k[..n];
+    }
+    rates
 }
 
 #[inline(always)]

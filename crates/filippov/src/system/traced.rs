@@ -383,8 +383,11 @@ impl PiecewiseSystem for TracedSystem {
         place: &Place<'_>,
         scale: &ErrorScale,
     ) -> Result<f64, FieldError> {
+        let own = |&i: &usize| scale.tolerance(i, place.x[i], place.x[i]);
+        if let Some(i) = self.model.only_state {
+            return Ok(own(&i));
+        }
         Ok(self.with_gradient(j, place, |_, states, values| {
-            let own = |&i: &usize| scale.tolerance(i, place.x[i], place.x[i]);
             let entries = states.iter().zip(values);
             entries.map(|(i, value)| value.abs() * own(i)).sum()
         }))
