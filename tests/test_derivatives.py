@@ -569,6 +569,14 @@ def test_random_systems_with_rare_instants(seed: int) -> None:
     assert found.n_columns >= 3
 
 
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_a_crossing_behind_which_the_motion_goes_along_the_surface_is_named() -> None:
+    """The field behind `x1 = 0` is tangent to it: changed motions slide on it, or leave it."""
+    found = compare(42957)
+    assert found.outcome == "named"
+    assert not found.wrong
+
+
 def test_a_start_at_the_threshold_of_a_law_is_named() -> None:
     system = fl.System(lambda t, x: [1.0 - 3.0 * fl.hysteresis(x[0], -1.0, 0.0)], n=1)
     with pytest.warns(fl.FilippovWarning, match="one_sided: the run starts at the threshold of a law"):

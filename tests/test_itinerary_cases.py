@@ -138,3 +138,21 @@ def test_table_of_exits_from_one_surface(case: dict[str, Any]) -> None:
 def test_tables_are_not_empty() -> None:
     assert len(switching_cases("classical")) >= 8
     assert len(switching_cases("codim1-exit")) >= 8
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-9, 1e-11])
+def test_sliding_from_a_two_fold_takes_series_behind_it(rtol: float) -> None:
+    """Both fields are tangent to `x0 = 0` at the origin, where the motion arrives: the multiplier is 0 / 0."""
+
+    def fun(t: float, x: Any) -> Any:
+        side = np.sign(x[0])
+        plus = -3 * x[2] + 0.5 * x[1] - 2 * x[1] ** 2 + 0.5 * x[0] + t
+        return [-x[2] + 1.5 * x[1] - 0.5 * x[0] - t + side * plus, 2.5 - 0.5 * side, 1.5 - 0.5 * side]
+
+    system = fl.System(fun, n=3)
+    start = [1 / 1536, -1 / 8, -1 / 16]
+    sol = system.solve((-1 / 16, 1 / 32), start, method="Taylor", rtol=rtol, atol=1e-3 * rtol)
+    assert [segment.mode for segment in sol.segments] == [(1,), (0,)]
+    assert sol.stats["n_steps"] + sol.stats["n_rejected"] < 30
+    exact = system.solve((-1 / 16, 1 / 32), start, method="DOPRI5", rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(sol.y[:, -1], exact.y[:, -1], atol=100 * rtol)

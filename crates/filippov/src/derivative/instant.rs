@@ -154,7 +154,7 @@ impl Instant<'_, '_> {
         let mut sliding = self.after.sliding.iter();
         let enters = record.acts.is_empty() && sliding.any(|j| !self.before.sliding.contains(j));
         let z = self.extended.state(record.x[1]);
-        if enters && self.after.stays_at_an_end(record.t[1], &z)? {
+        if enters && self.after.stays_at_an_end(record.t[1], &z)? || self.goes_on_along()? {
             return Ok(Err(Lost::OneSided));
         }
         if let Some(entry) = self.entry()? {
@@ -188,6 +188,20 @@ impl Instant<'_, '_> {
         };
         passage.changes.extend(held);
         Ok(Ok(passage))
+    }
+
+    /// Does the motion cross a surface and then go along it, up to rounding? A changed one may slide on it, and differ by as much.
+    fn goes_on_along(&mut self) -> Result<bool, FieldError> {
+        let record = self.record;
+        let [before, after] = record.mode.map(|mode| mode.entries());
+        let guard = match *record.guards {
+            [guard @ Guard::Surface(j)] if before[j] * after[j] < 0 => guard,
+            _ => return Ok(false),
+        };
+        let z = self.extended.state(record.x[0]);
+        let own = self.before.gradient_of(guard, record.t[0], &z)?;
+        let [before, after] = record.field.map(|field| own.time + dot(&own.state, field));
+        Ok(record.acts.is_empty() && after.abs() <= ROUNDING * before.abs())
     }
 
     /// The derivative of the time, a row, from what fixes it.

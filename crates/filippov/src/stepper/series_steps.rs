@@ -260,6 +260,10 @@ impl Stepper for Taylor {
 
     #[inline(always)]
     fn prepare(&mut self, at: &mut Run) -> Result<Ready, FieldError> {
+        // At a two-fold the multiplier of the series is a quotient of rounding.
+        if matches!(&at.motion.field, ModeField::Sliding(field) if field.is_at_two_fold(at.t)) {
+            return Ok(Ready::NotThisStep);
+        }
         let allowed = match self.series.reach.take() {
             Some(allowed) => allowed,
             None if self.is_expanded() => return Ok(Ready::ANY),
