@@ -280,10 +280,12 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         signs: &[f64],
         velocity: &[f64],
     ) -> Result<f64, FieldError> {
+        let sizes = self.x.iter().enumerate();
+        let sizes: Values = sizes.map(|(i, x)| self.scale.size(i, *x)).collect();
         let speed = |v: &[f64]| {
-            let speeds = v.iter().zip(self.x).enumerate();
+            let speeds = v.iter().zip(&sizes);
             speeds
-                .map(|(i, (v, x))| v.abs() / self.scale.size(i, *x))
+                .map(|(v, size)| v.abs() / size)
                 .filter(|speed| speed.is_finite())
                 .fold(0.0, f64::max)
         };

@@ -1,5 +1,7 @@
 //! Surfaces with one normal at a point: are they in one place, or do they touch? What holds a motion on two that touch?
 
+use smallvec::SmallVec;
+
 use super::candidate::Candidate;
 use super::point::{Notes, Point, Values};
 use crate::cube::{roots_in_cube, NormalFields};
@@ -41,8 +43,22 @@ impl Parallels {
         let row = |i: usize| &normals[i * n..(i + 1) * n];
         let squares: Values = (0..meeting.len()).map(|i| dot(row(i), row(i))).collect();
         let has_normal = |i: usize| squares[i] != 0.0;
+        // Where the first and the last entry are that is not zero: normals apart are not parallel.
+        let ends = |i: usize| {
+            let mut entries = row(i).iter().zip(0..).filter(|(entry, _)| **entry != 0.0);
+            let (_, first) = entries.next()?;
+            Some((first, entries.last().map_or(first, |(_, last)| last)))
+        };
+        let reach: SmallVec<[_; 8]> = (0..meeting.len()).map(ends).collect();
+        let are_apart = |i: usize, k: usize| match (reach[i], reach[k]) {
+            (Some(one), Some(other)) => one.1 < other.0 || other.1 < one.0,
+            _ => false,
+        };
         let mut found = Parallels::default();
         for (i, k) in (0..meeting.len()).flat_map(|k| (0..k).map(move |i| (i, k))) {
+            if are_apart(i, k) {
+                continue;
+            }
             let (i, k) = if has_normal(i) { (i, k) } else { (k, i) };
             let (one, other) = (row(i), row(k));
             if !has_normal(i) || !are_parallel(dot(one, other), squares[i] * squares[k]) {

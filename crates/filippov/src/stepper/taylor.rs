@@ -260,18 +260,18 @@ impl Taylor {
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
     /// theta there; some states at a time.
     fn sum(&mut self, y: &[f64]) {
-        const BLOCK: usize = 4;
-        let in_blocks = self.n - self.n % BLOCK;
-        for first in (0..in_blocks).step_by(BLOCK) {
-            self.sum_columns::<BLOCK>(y, first);
-        }
-        for state in in_blocks..self.n {
-            self.sum_columns::<1>(y, state);
+        let mut first = 0;
+        while first < self.n {
+            first += match self.n - first {
+                8.. => self.sum_columns::<8>(y, first),
+                4.. => self.sum_columns::<4>(y, first),
+                _ => self.sum_columns::<1>(y, first),
+            };
         }
     }
 
-    /// The same for `N` states from this one on.
-    fn sum_columns<const N: usize>(&mut self, y: &[f64], first: usize) {
+    /// The same for `N` states from this one on; returns their number.
+    fn sum_columns<const N: usize>(&mut self, y: &[f64], first: usize) -> usize {
         let (n, dt, own) = (self.n, self.step.interpolant.dt, first..first + N);
         let scaled = self.step.interpolant.coefficients_mut();
         scaled[own.clone()].copy_from_slice(&y[own.clone()]);
@@ -295,6 +295,7 @@ impl Taylor {
         }
         self.step.end[own.clone()].copy_from_slice(&y1);
         self.defect[own].copy_from_slice(&slope);
+        N
     }
 
     /// As [`sum`](Self::sum), for few states: they stay in registers.
