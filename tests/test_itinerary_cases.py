@@ -142,7 +142,7 @@ def test_tables_are_not_empty() -> None:
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-9, 1e-11])
 def test_sliding_from_a_two_fold_takes_series_behind_it(rtol: float) -> None:
-    """Both fields are tangent to `x0 = 0` at the origin, where the motion arrives: the multiplier is 0 / 0."""
+    """Both fields are tangent to `x0 = 0` at the origin, where it arrives: the multiplier is 0 / 0."""
 
     def fun(t: float, x: Any) -> Any:
         side = np.sign(x[0])
