@@ -93,11 +93,10 @@ fn the_curve_is_within_the_tolerance() {
         let reply = ask(&model, &request);
         counts.push(check_curve(&model, &reply, "[0, 60]", tolerance));
     }
-    // The error of chords falls with the square of their lengths.
-    assert!(
-        counts[1] > 2 * counts[0] && counts[2] > 2 * counts[1],
-        "{counts:?}"
-    );
+    // The error of chords falls with the square of their lengths: over two digits their number would be ten times as
+    // large, but for the ends of steps, which are there at any tolerance.
+    assert!(counts.is_sorted(), "{counts:?}");
+    assert!(counts[2] > 6 * counts[0], "{counts:?}");
     assert!(counts[1] < 600, "{counts:?}");
 }
 
