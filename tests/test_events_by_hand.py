@@ -190,7 +190,13 @@ def test_relay_behind_a_dead_zone(dead_zone: Callable[[Any], Any], drive: float,
     )
     assert sol.success
     assert len(times) >= n_switches
-    assert sol.switches.t == pytest.approx(times, abs=1e-8)
+    # The weak drive leaves a motion that comes to the end of the zone after each turn, and no farther:
+    # there it switches to and fro within rounding, or not at all.
+    found = sol.switches.t
+    last = len(times) if drive < 1 else len(found)
+    touches = times[-1] + 2 * math.pi * np.arange(1, 4)
+    assert found[:last] == pytest.approx(times, abs=1e-8)
+    assert all(np.abs(touches - t).min() < 1e-5 for t in found[last:])
     assert sol.y[:, -1] == pytest.approx(end, abs=1e-8)
 
 

@@ -32,7 +32,7 @@ __all__ = ["ManifoldCurve", "manifold"]
 # How far from the equilibrium or cycle a curve starts, in units of its size.
 _START = 1e-6
 # Points of a trajectory between two steps of the solver; runs in a row, each longer than the one before.
-_PER_STEP, _MOST_RUNS, _LONGER = 16, 40, 1.5
+_PER_STEP, _MOST_RUNS, _LONGER = 64, 40, 1.5
 # A run that moves by less than this share of the length wanted is at rest.
 _AT_REST = 1e-7
 # Points of the first segment; the largest gap, in units of the size; how many points are too many.
