@@ -8,8 +8,9 @@ use mimalloc::MiMalloc;
 /// Pieces of up to so many bytes are small.
 const LARGEST_SMALL: usize = 1024;
 
-/// Small pieces are taken and given back a thousand times per millisecond, and mimalloc is fast at that. Long ones are few; the
-/// system gives those that are freed back at once, so that a run takes no more memory than it says.
+/// A run with many contacts takes and frees thousands of small pieces per millisecond, which mimalloc does faster than the
+/// system. Long pieces are few. The system returns them sooner than mimalloc, which keeps a run within the memory that
+/// it may take.
 pub struct BySize;
 
 /// Calls the allocator of pieces of this size.

@@ -8,7 +8,8 @@ use super::{Asleep, Monitored};
 use crate::mode::{Mode, Signs};
 use crate::system::{MotionJets, PiecewiseSystem};
 
-/// A run remembers so many modes. When it meets one more it forgets them all, and finds again what follows from each.
+/// The largest number of modes that a run keeps. When the run meets another mode, it clears the list and computes the
+/// properties of each mode anew.
 const MOST_KNOWN: usize = 8;
 
 /// The series of a mode, counted by the run itself: threads that share them would wait for one another at every motion.
