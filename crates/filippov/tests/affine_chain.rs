@@ -2,6 +2,8 @@
 //! the relay problem, the field by one linear system, without ever forming the fields of all signs.
 #![allow(clippy::unwrap_used)]
 
+use std::borrow::Cow;
+
 use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 use filippov::{PiecewiseSystem, Place, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
@@ -44,7 +46,7 @@ fn released(system: &dyn PiecewiseSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
         .unwrap();
     let problem = RelayProblem {
         nu: parts.nu(),
-        n: parts.normal().clone(),
+        n: Cow::Borrowed(parts.normal()),
         noise: system.lie_tolerance(1),
     };
     let found = solve_relay(&problem, &vec![0; d]).unwrap();

@@ -23,6 +23,8 @@
 
 use std::borrow::Cow;
 
+use smallvec::SmallVec;
+
 use super::shared_load::{idle, largest, KnownUniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
@@ -40,11 +42,11 @@ const SOLVED: f64 = 8.0;
 
 /// The data of (R), one entry or row per surface.
 #[derive(Clone, Debug)]
-pub struct RelayProblem {
+pub struct RelayProblem<'n> {
     /// The rates of the switching functions at s = 0.
     pub nu: Vec<f64>,
     /// How they depend on the signs.
-    pub n: SparseRows,
+    pub n: Cow<'n, SparseRows>,
     /// Rates below this fraction of the sum of their terms count as zero: `PiecewiseSystem::lie_tolerance(1)`.
     pub noise: f64,
 }
@@ -93,18 +95,19 @@ pub enum RelayError {
 ///
 /// # Example
 /// ```
+/// use std::borrow::Cow;
 /// use filippov::sparse::SparseRows;
 /// use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 /// // Two masses of 1 pushed with 0.5 and 3 against friction of 1, joined by a damper.
 /// let n = SparseRows::from_dense(&[vec![-1.0, 0.2], vec![0.2, -1.0]]);
-/// let problem = RelayProblem { nu: vec![0.5, 3.0], n, noise: 1e-11 };
+/// let problem = RelayProblem { nu: vec![0.5, 3.0], n: Cow::Owned(n), noise: 1e-11 };
 /// let found = solve_relay(&problem, &[0, 0])?;
 /// assert_eq!(found.modes, [0, 1]);
 /// assert!((found.signs[0] - 0.7).abs() < 1e-15 && (found.rates[1] - 2.14).abs() < 1e-15);
 /// assert_eq!(found.uniqueness, Uniqueness::Certain);
 /// # Ok::<(), filippov::switching::RelayError>(())
 /// ```
-pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolution, RelayError> {
+pub fn solve_relay(problem: &RelayProblem<'_>, before: &[i8]) -> Result<RelaySolution, RelayError> {
     let known = &mut KnownUniqueness::default();
     solve_relay_within(problem, before, Patience::endless(), known)
 }
@@ -114,7 +117,7 @@ pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolutio
 /// # Errors
 /// As [`solve_relay`]; [`RelayError::Undecided`] also when the caller has waited long enough.
 pub fn solve_relay_within(
-    problem: &RelayProblem,
+    problem: &RelayProblem<'_>,
     before: &[i8],
     patience: Patience,
     known: &mut KnownUniqueness,
@@ -144,7 +147,7 @@ struct State {
 /// The pivots of one problem.
 struct Pivots<'a> {
     /// The problem without the effects of idle surfaces, which are rounding.
-    problem: Cow<'a, RelayProblem>,
+    problem: Cow<'a, RelayProblem<'a>>,
     /// The signs of these surfaces have no effect, for instance those of kinks. Each sign follows the rate of its surface.
     is_idle: Vec<bool>,
     uniqueness: Uniqueness,
@@ -160,17 +163,20 @@ struct Pivots<'a> {
 }
 
 impl<'a> Pivots<'a> {
-    fn new(problem: &'a RelayProblem, patience: Patience<'a>, known: &mut KnownUniqueness) -> Self {
+    fn new(
+        problem: &'a RelayProblem<'a>,
+        patience: Patience<'a>,
+        known: &mut KnownUniqueness,
+    ) -> Self {
         let m = problem.nu.len();
-        let ones = vec![1.0; m];
-        let is_idle = idle(&problem.n, |i| problem.rounding(&ones, i));
+        let is_idle = idle(&problem.n, |i| problem.rounding_at_ends(i));
         let mut problem = Cow::Borrowed(problem);
         if is_idle.contains(&true) {
             let acts = is_idle.iter().map(|is_idle| f64::from(u8::from(!is_idle)));
             let acts: Vec<f64> = acts.collect();
-            problem.to_mut().n = problem.n.with_columns_scaled(&acts);
+            problem.to_mut().n = Cow::Owned(problem.n.with_columns_scaled(&acts));
         }
-        let acting: Vec<usize> = (0..m).filter(|&i| !is_idle[i]).collect();
+        let acting: SmallVec<[usize; 16]> = (0..m).filter(|&i| !is_idle[i]).collect();
         let uniqueness = known.of(&problem.n.principal(&acting));
         Pivots {
             nu: problem.nu.clone(),
@@ -227,7 +233,7 @@ impl<'a> Pivots<'a> {
                 return None;
             }
             let state = self.state(&modes).ok()?;
-            let wrong: Vec<usize> = (0..modes.len())
+            let wrong: SmallVec<[usize; 16]> = (0..modes.len())
                 .filter(|&i| self.is_wrong(&state, i))
                 .collect();
             if wrong.is_empty() {
@@ -379,11 +385,17 @@ impl<'a> Pivots<'a> {
     }
 }
 
-impl RelayProblem {
+impl RelayProblem<'_> {
     /// A rate below this is rounding: of the rates at the signs, and of signs of size 1.
     fn rounding(&self, signs: &[f64], i: usize) -> f64 {
         let of_signs: f64 = self.n.row(i).map(|(_, value)| value.abs()).sum();
         self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs)) + EPS * of_signs
+    }
+
+    /// The same where all signs have size 1.
+    fn rounding_at_ends(&self, i: usize) -> f64 {
+        let of_signs: f64 = self.n.row(i).map(|(_, value)| value.abs()).sum();
+        self.noise * (self.nu[i].abs() + of_signs) + EPS * of_signs
     }
 
     /// How much of a sign is rounding, if the rates are known up to `rounding`.
@@ -396,7 +408,7 @@ impl RelayProblem {
 impl RelaySolution {
     /// Makes a solution whose motion alone is unique one of modes: what does not slip sticks, though its sign may be -1 or
     /// +1. Where the strength of all contacts of a loop is just used up, the entries stay degenerate.
-    fn let_stick(&mut self, problem: &RelayProblem) {
+    fn let_stick(&mut self, problem: &RelayProblem<'_>) {
         let rate = |i: usize| problem.nu[i] + problem.n.dot(i, &self.signs);
         let sticks = |&i: &usize| {
             let rounding = SOLVED * problem.rounding(&self.signs, i);

@@ -197,6 +197,10 @@ impl Matrix {
 
 /// Inverts n rows of n entries where they are; `false`, with entries lost, if a pivot vanishes or is not finite.
 pub(crate) fn invert(rows: &mut [f64], n: usize) -> bool {
+    if let ([entry], 1) = (&mut *rows, n) {
+        *entry = 1.0 / *entry;
+        return entry.is_finite() && *entry != 0.0;
+    }
     let mut swaps = SmallVec::<[usize; 8]>::new();
     for column in 0..n {
         let size = |row: &usize| rows[row * n + column].abs();

@@ -93,12 +93,16 @@ pub(super) fn repeats(a: &Switch, b: &Switch) -> bool {
 
 /// The limit that the last switches tend to: turns of equally many switches, each turn shorter and nearer to
 /// an intersection than the one before by the same ratio (`docs/theory/intersections.md`).
-pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError> {
+/// The last turns have `turn` switches each, if there are any.
+pub(crate) fn limit_of_switches(
+    at: &Point,
+    turn: Option<usize>,
+) -> Result<Option<Limit>, FieldError> {
     let switches = at.arrival.switches;
     if let Some(limit) = limit_of_unresolved_flights(at)? {
         return Ok(Some(limit));
     }
-    let Some(turn) = turn_of(switches) else {
+    let Some(turn) = turn else {
         return Ok(None);
     };
     let last = switches.len() - 1;
@@ -507,7 +511,7 @@ fn reach(scale: &ErrorScale, x: &[f64]) -> f64 {
 }
 
 /// How many switches a turn has, if the last three turns repeat.
-pub(super) fn turn_of(switches: &[Switch]) -> Option<usize> {
+pub(crate) fn turn_of(switches: &[Switch]) -> Option<usize> {
     let last = switches.last()?;
     let earlier = switches.iter().rev().skip(1).take(LONGEST_TURN);
     let turn = earlier

@@ -19,7 +19,7 @@ use crate::switch::Switch;
 use crate::switching::Decision;
 use crate::system::eval_on_side;
 use crate::system::Actions;
-use crate::system::{dot, dot_magnitude, PiecewiseSystem, Place, Setting};
+use crate::system::{dot, dot_magnitude, AffineParts, PiecewiseSystem, Place, Setting};
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
 /// One value per surface; few are kept without allocation.
@@ -40,6 +40,8 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub policy: Policy<'a>,
     /// What is known of the equations at meetings.
     pub known: &'p RefCell<KnownUniqueness>,
+    /// For the fields around a meeting: that of the decision before.
+    pub space: &'p RefCell<AffineParts>,
     /// How long the caller waits.
     pub patience: Patience<'p>,
 }

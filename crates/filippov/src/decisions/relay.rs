@@ -1,5 +1,7 @@
 //! Meetings of surfaces where the field is affine in their signs: one relay problem, whatever their number.
 
+use std::borrow::Cow;
+
 use super::choice::choose;
 use super::consistency::agreeing_with_own_signs;
 use super::germ::{evaluate, surfaces_left, Found};
@@ -35,18 +37,35 @@ pub(super) fn decide_by_relay(
     if !is_event && surfaces.len() == 2 && !Parallels::of(at, surfaces, mode)?.are_any() {
         return Ok(None);
     }
-    let affine = at.system.affine_signs();
-    let Some(mut parts) = affine.and_then(|affine| affine.affine_parts(surfaces)) else {
+    let Some(affine) = at.system.affine_signs() else {
         return Ok(None);
     };
-    let mut found = relay_at(at, notes, meeting, &mut parts, false)?;
+    let mut parts = at.space.take();
+    let decided = match affine.refit_affine_parts(surfaces, &mut parts) {
+        true => decide_with(&mut parts, at, notes, meeting),
+        false => Ok(None),
+    };
+    at.space.replace(parts);
+    decided
+}
+
+/// The same with space for the fields around the point.
+fn decide_with(
+    parts: &mut AffineParts,
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    let (mode, surfaces) = (meeting.mode, meeting.surfaces);
+    let is_event = matches!(meeting.how, How::Event(_));
+    let mut found = relay_at(at, notes, meeting, parts, false)?;
     let is_open = |posed: &Posed| {
         let found = &posed.solution;
         !found.degenerate.is_empty() || !found.loops.is_empty()
     };
     let is_late = is_event && found.as_ref().is_some_and(is_open);
     if is_late {
-        found = relay_at(at, notes, meeting, &mut parts, true)?;
+        found = relay_at(at, notes, meeting, parts, true)?;
     }
     let Some(Posed {
         solution: mut found,
@@ -90,11 +109,11 @@ pub(super) fn decide_by_relay(
     // Where other signs have changed with it, the fields are others.
     let is_as_posed = after == meeting.on_all(&Mode::new(found.modes.clone()));
     if is_late && is_as_posed {
-        evaluate(at, notes, &mut parts, &mode.signs())?;
+        evaluate(at, notes, parts, &mode.signs())?;
     }
     let found = Found {
         multipliers: &multipliers,
-        parts: is_as_posed.then_some(&mut parts),
+        parts: is_as_posed.then_some(parts),
     };
     let left = surfaces_left_or_caught(at, notes, &mut after, surfaces, found)?;
     Ok(Some(Ok(Next::new(after, left))))
@@ -172,7 +191,7 @@ fn relay_at(
     let (gradients, noise) = (&parts.gradients, at.system.lie_tolerance(1));
     let problem = RelayProblem {
         nu: parts.nu(),
-        n: parts.normal().clone(),
+        n: Cow::Borrowed(parts.normal()),
         noise,
     };
     let known = &mut at.known.borrow_mut();

@@ -24,9 +24,14 @@ pub(crate) struct Rounds {
 }
 
 impl Rounds {
-    /// Takes the last of these switches down. Is the last round, of crossings only, smaller than the tolerance, after one of at least
+    /// Takes the last of these switches down; the last turns have `turn` switches each, if there are any. Is the last round, of crossings only, smaller than the tolerance, after one of at least
     /// twice its size, and twice as long?
-    pub fn are_small(&mut self, switches: &[Switch], scale: &ErrorScale) -> bool {
+    pub fn are_small(
+        &mut self,
+        switches: &[Switch],
+        turn: Option<usize>,
+        scale: &ErrorScale,
+    ) -> bool {
         let Some(last) = switches.len().checked_sub(1) else {
             return false;
         };
@@ -36,7 +41,7 @@ impl Rounds {
         };
         if self.turn.filter(goes_on).is_none() {
             *self = Rounds {
-                turn: turn_of(switches),
+                turn,
                 ..Rounds::default()
             };
         }

@@ -65,6 +65,7 @@ impl<'a> Scene<'_, 'a> {
             arrival: &arrival,
             policy: run.options.into(),
             known: &run.known,
+            space: &run.space,
             patience: self.patience,
         };
         question(&at, notes)

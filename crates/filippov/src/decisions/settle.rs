@@ -140,9 +140,12 @@ fn with_kinetic_friction(
         return Ok(decided);
     };
     let slips = |j: &usize| at.system.sticks_at(*j) && next.mode.entries()[*j] != 0;
-    let (slipping, others): (Vec<usize>, Vec<usize>) =
-        meeting.surfaces.iter().partition(|j| slips(j));
-    if slipping.is_empty() || others.is_empty() {
+    if !meeting.surfaces.iter().any(slips) {
+        return Ok(decided);
+    }
+    let others = meeting.surfaces.iter().copied().filter(|j| !slips(j));
+    let others: Vec<usize> = others.collect();
+    if others.is_empty() {
         return Ok(decided);
     }
     match place_on(at, notes, &next.mode, &others, Some(&next.mode))?.decided {

@@ -178,9 +178,10 @@ pub fn classify(
         nonunique: NonUnique::Regularize,
         choices: &[],
     };
-    let known = RefCell::default();
+    let (known, space) = (RefCell::default(), RefCell::default());
     let point = |arrival| Point {
         known: &known,
+        space: &space,
         system,
         actions: &actions,
         scale: &scale,

@@ -3,7 +3,7 @@
 use crate::action::{identity, quiet_change, Instant};
 use crate::decisions::limits::{
     limit_here, limit_of_impact_rounds, limit_of_switches, limit_of_unresolved_flights,
-    limits_of_impacts, passed_beside, Limit, Passed,
+    limits_of_impacts, passed_beside, turn_of, Limit, Passed,
 };
 use crate::decisions::{
     add_vanishing_surfaces, cling, decide, differs_between_sides, end_of_sliding, goes_through,
@@ -233,12 +233,13 @@ impl<'a> Integrator<'a> {
             // One surface meets no other, but perhaps its rate.
             let is_of_higher_degree = |j: usize| self.run.system.reduced(&[j]).is_some();
             if self.run.system.n_surfaces() > 1 || is_of_higher_degree(0) {
-                let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
+                let turn = turn_of(self.recorder.switches());
+                let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at, turn))?;
                 if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                     return self.jump_to(limit, next.mode);
                 }
                 let (switches, scale) = (self.recorder.switches(), &self.run.scale);
-                if self.progress.rounds.are_small(switches, scale) {
+                if self.progress.rounds.are_small(switches, turn, scale) {
                     if let Some(mean) = self.ask(Cause::Start, mean_of_rounds)? {
                         self.recorder.replace();
                         return self.jump_to(mean, next.mode);

@@ -1,5 +1,7 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
+use std::borrow::Cow;
+
 use super::canopy::root_ends;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
@@ -57,6 +59,18 @@ impl<'a> AffineLaw<'a> {
             shared: None,
             loads: None,
         })
+    }
+
+    /// Becomes the law for other surfaces; `false`, and it is of no use, if the field is not affine in their signs.
+    pub fn refit(&mut self, set: &[usize], setting: Setting<'_>) -> bool {
+        if !self.system.refit_affine_parts(set, &mut self.parts) {
+            return false;
+        }
+        self.is_orthogonal = self.parts.gradients.has_disjoint_rows();
+        self.kappa.resize(set.len(), 1.0);
+        self.multipliers.resize(set.len(), f64::NAN);
+        self.restart(setting);
+        true
     }
 
     /// Sets the scaling of the surfaces.
@@ -133,7 +147,7 @@ impl<'a> AffineLaw<'a> {
         if entries().any(|(reserve, sign)| reserve.is_some() && sign.abs() > 1.0) {
             let problem = RelayProblem {
                 nu: self.parts.nu(),
-                n: self.parts.normal().clone(),
+                n: Cow::Borrowed(self.parts.normal()),
                 noise: self.system.noise_of_rates(),
             };
             if let Ok(inside) = solve_relay(&problem, &vec![0; here.len()]) {

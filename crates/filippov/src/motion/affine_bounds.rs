@@ -32,7 +32,8 @@ pub struct AffineBounds {
     /// Contacts whose sign acts on no other rate, and whose rate no other sign acts on.
     is_uncoupled: Vec<bool>,
     normal: RefCell<SparseSolver>,
-    comparison: RefCell<SparseSolver>,
+    /// None where N is diagonal, as `<N>` is N then but for signs.
+    comparison: Option<RefCell<SparseSolver>>,
 }
 
 /// The multipliers along a piece of motion, and their rates.
@@ -57,18 +58,25 @@ pub struct KnownMultipliers<'k> {
 impl AffineBounds {
     /// The bounds where N is this matrix; `None` if it is singular, or its comparison matrix is no M-matrix.
     pub fn new(matrix: &SparseRows) -> Option<Self> {
-        let (mut normal, mut comparison) = (SparseSolver::default(), SparseSolver::default());
+        let mut normal = SparseSolver::default();
         normal.factor(matrix).ok()?;
-        comparison.factor(&matrix.comparison()).ok()?;
-        let mut positive = vec![1.0; matrix.n_rows()];
-        comparison.solve(&mut positive);
-        // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
-        let is_m_matrix = positive.iter().all(|v| v.is_finite() && *v > 0.0);
-        is_m_matrix.then(|| AffineBounds {
+        let mut comparison = None;
+        if !matrix.is_diagonal() {
+            let mut solver = SparseSolver::default();
+            solver.factor(&matrix.comparison()).ok()?;
+            let mut positive = vec![1.0; matrix.n_rows()];
+            solver.solve(&mut positive);
+            // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
+            if !positive.iter().all(|v| v.is_finite() && *v > 0.0) {
+                return None;
+            }
+            comparison = Some(RefCell::new(solver));
+        }
+        Some(AffineBounds {
             matrix: matrix.clone(),
             is_uncoupled: uncoupled(matrix),
             normal: RefCell::new(normal),
-            comparison: RefCell::new(comparison),
+            comparison,
         })
     }
 
@@ -130,7 +138,8 @@ impl AffineBounds {
         let mut middles: Rates = g.iter().map(|g| 0.5 * (g.lo + g.hi)).collect();
         let mut radii: Rates = g.iter().map(|g| 0.5 * (g.hi - g.lo)).collect();
         self.normal.borrow_mut().solve(&mut middles);
-        self.comparison.borrow_mut().solve(&mut radii);
+        let comparison = self.comparison.as_ref().unwrap_or(&self.normal);
+        comparison.borrow_mut().solve(&mut radii);
         let largest = middles.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         // A rounding error per unknown and operation, many times over.
         let rounding = 1e-12 + 1e-10 * largest;

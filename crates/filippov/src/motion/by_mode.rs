@@ -98,6 +98,24 @@ impl<'a> ModeField<'a> {
         }
     }
 
+    /// The field of a mode without contact and without surfaces of higher relative degree, in the space of one that slides on several
+    /// surfaces, if there is one.
+    pub(crate) fn in_space_of(
+        spare: Option<Self>,
+        system: &'a dyn PiecewiseSystem,
+        law: Law<'a>,
+        sliding: &[usize],
+        setting: Setting<'_>,
+    ) -> Self {
+        if let Some(ModeField::Intersection(mut field)) = spare {
+            let is_one = sliding.len() > 1 && law.rule == SlidingRule::Canopy;
+            if is_one && field.refit(sliding, setting, &law.scaling(sliding)) {
+                return ModeField::Intersection(field);
+            }
+        }
+        ModeField::new(system, law, sliding, setting)
+    }
+
     /// Becomes the field of another mode of its kind; `false` if it is of another kind, or slides on several surfaces that are not
     /// those of the mode.
     pub(crate) fn restart(&mut self, sliding: &[usize], setting: Setting<'_>) -> bool {

@@ -162,7 +162,13 @@ impl<'a> CurrentMotion<'a> {
                 std::mem::swap(&mut self.field, &mut self.idle[index]);
             }
             Some(index) => self.field = self.idle.swap_remove(index),
-            None => self.replace_field(ModeField::new(system, self.law, sliding, setting)),
+            None => {
+                // That which was used longest ago.
+                let is_full = self.idle.len() == MOST_IDLE;
+                let spare = is_full.then(|| self.idle.remove(0));
+                let field = ModeField::in_space_of(spare, system, self.law, sliding, setting);
+                self.replace_field(field);
+            }
         }
     }
 

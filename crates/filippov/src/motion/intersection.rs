@@ -174,7 +174,26 @@ impl<'a> IntersectionField<'a> {
         true
     }
 
-    /// Is it worth to be kept for another motion on the same surfaces?
+    /// Becomes the field of sliding on other surfaces, in the same space; `false`, and it is of no use, if it cannot.
+    pub fn refit(&mut self, set: &[usize], setting: Setting<'_>, kappa: &[f64]) -> bool {
+        let Some(law) = self.affine.as_mut().filter(|_| self.by_rule.is_none()) else {
+            return false;
+        };
+        if !law.refit(set, setting) {
+            return false;
+        }
+        law.set_scaling(kappa);
+        self.kappa.clear();
+        self.kappa.extend_from_slice(kappa);
+        self.set.clear();
+        self.set.extend_from_slice(set);
+        self.has_canopy = set.len() <= MOST_MEETING;
+        self.exits.resize(2 * set.len() + 2, f64::NAN);
+        self.slack.resize(2 * set.len(), 0.0);
+        self.restart(set, setting)
+    }
+
+    /// Is it worth to be kept for another motion?
     pub fn is_lasting(&self) -> bool {
         !IS_PAGE && self.affine.is_some() && self.by_rule.is_none()
     }
@@ -182,7 +201,8 @@ impl<'a> IntersectionField<'a> {
     /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the
     /// regularised motion goes around the root, so that it need not be stable.
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
-        self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
+        self.tracked.clear();
+        self.tracked.push((f64::INFINITY, lambda.to_vec()));
         self.start = None;
         self.oscillates = oscillates.then_some(true);
         if let Some(law) = &mut self.affine {

@@ -8,7 +8,7 @@ use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::options::Options;
 use crate::stats::Stats;
-use crate::system::{Actions, PiecewiseSystem};
+use crate::system::{Actions, AffineParts, PiecewiseSystem};
 use crate::tolerances::SMALL_JUMP;
 
 /// A run: its problem, the place that it has reached, the motion from there, and what was counted.
@@ -32,6 +32,8 @@ pub(crate) struct Run<'a> {
     pub passing: Vec<usize>,
     /// What its decisions found out of the equations at meetings.
     pub known: RefCell<KnownUniqueness>,
+    /// Space for the fields around a meeting.
+    pub space: RefCell<AffineParts>,
     pub stats: Stats,
 }
 
@@ -63,6 +65,7 @@ impl<'a> Run<'a> {
             residuals: Vec::new(),
             passing: Vec::new(),
             known: RefCell::default(),
+            space: RefCell::default(),
             stats: Stats::default(),
         }
     }

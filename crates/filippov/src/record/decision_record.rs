@@ -180,6 +180,7 @@ pub fn replay_decision(
         arrival: &arrival,
         policy: Policy::from(options),
         known: &RefCell::default(),
+        space: &RefCell::default(),
         patience: Patience::endless(),
     };
     let mut notes = Notes {

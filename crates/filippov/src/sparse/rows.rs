@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use smallvec::SmallVec;
+
 /// A sparse matrix by rows. The pattern is kept while values change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseRows {
@@ -45,9 +47,18 @@ impl SparseRows {
         matrix
     }
 
+    /// Takes all rows out, and makes room for so many rows and entries.
+    pub(crate) fn clear_for(&mut self, n_columns: usize, (rows, entries): (usize, usize)) {
+        self.clear(n_columns);
+        self.starts.reserve(rows);
+        self.columns.reserve(entries);
+        self.values.reserve(entries);
+    }
+
     /// Takes all rows out, and keeps their space.
     pub fn clear(&mut self, n_columns: usize) {
-        self.starts.truncate(1);
+        self.starts.clear();
+        self.starts.push(0);
         self.columns.clear();
         self.values.clear();
         self.n_columns = n_columns;
@@ -251,27 +262,36 @@ pub struct SparseProduct {
 impl SparseProduct {
     /// Finds the pattern of A B^T. Its diagonal is always kept.
     pub fn new(a: &SparseRows, b: &SparseRows) -> Self {
+        let mut product = SparseProduct::default();
+        product.find_pattern(a, b);
+        product
+    }
+
+    /// Becomes the product of two other matrices, in the same space.
+    pub fn find_pattern(&mut self, a: &SparseRows, b: &SparseRows) {
+        let SparseProduct { terms, matrix } = self;
         // Column, row and place of the entries of B, one column after the other.
-        let mut users = Vec::with_capacity(b.n_entries());
+        let mut users: SmallVec<[_; 16]> = SmallVec::new();
         for j in 0..b.n_rows() {
             let entries = (b.starts[j] as u32..).zip(b.columns(j));
             users.extend(entries.map(|(entry, &column)| (column, j, entry)));
         }
         users.sort_unstable();
+        let users = &users[..];
         let room = (a.n_rows(), a.n_entries().max(a.n_rows()));
-        let mut matrix = SparseRows::with_capacity(b.n_rows(), room);
-        let (mut terms, mut met) = (Vec::with_capacity(a.n_entries()), Vec::new());
+        matrix.clear_for(b.n_rows(), room);
+        terms.clear();
+        terms.reserve(a.n_entries());
+        let mut met: SmallVec<[_; 16]> = SmallVec::new();
         for i in 0..a.n_rows() {
-            met.clear();
-            for (entry, &column) in (a.starts[i] as u32..).zip(a.columns(i)) {
+            let users_of = |column: usize| {
                 let first = users.partition_point(|user| user.0 < column);
-                let users = users[first..].iter().take_while(|user| user.0 == column);
-                met.extend(users.map(|&(_, j, other)| (j, entry, other)));
-            }
-            met.sort_unstable();
+                let users = users[first..].iter();
+                users.take_while(move |user| user.0 == column)
+            };
             let start = matrix.n_entries();
             let mut diagonal = (i < b.n_rows()).then_some(i);
-            for &(j, entry, other) in &met {
+            let mut add = |j: usize, entry: u32, other: u32| {
                 if let Some(i) = diagonal.take_if(|i| *i <= j) {
                     matrix.columns.push(i);
                 }
@@ -279,12 +299,23 @@ impl SparseProduct {
                     matrix.columns.push(j);
                 }
                 terms.push((matrix.columns.len() as u32 - 1, entry, other));
+            };
+            let first = a.starts[i] as u32;
+            if let &[column] = a.columns(i) {
+                users_of(column).for_each(|&(_, j, other)| add(j, first, other));
+            } else {
+                met.clear();
+                for (entry, &column) in (first..).zip(a.columns(i)) {
+                    met.extend(users_of(column).map(|&(_, j, other)| (j, entry, other)));
+                }
+                met.sort_unstable();
+                met.iter()
+                    .for_each(|&(j, entry, other)| add(j, entry, other));
             }
             matrix.columns.extend(diagonal);
             matrix.starts.push(matrix.columns.len());
         }
         matrix.values.resize(matrix.columns.len(), 0.0);
-        SparseProduct { terms, matrix }
     }
 
     /// Computes the values; A and B have the patterns of [`SparseProduct::new`].

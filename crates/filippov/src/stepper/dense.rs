@@ -113,7 +113,8 @@ impl Interpolant {
                 let n_rows = self.coefficients.len() / self.n;
                 // What stands still, or moves evenly, has a short series.
                 let used = (0..n_rows).rev().find(|&k| r(k) != 0.0).unwrap_or(0);
-                (0..=used).map(r).collect()
+                let column = self.coefficients[i..].iter().step_by(self.n);
+                column.take(used + 1).copied().collect()
             }
         };
         shift(&mut d, centre);
@@ -204,10 +205,25 @@ pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64,
 
 /// Horner's scheme for many states, some at a time.
 fn evaluate_in_blocks(coefficients: &[f64], theta: f64, y: &mut [f64]) {
-    const BLOCK: usize = 4;
     let n = y.len();
-    let (blocks, rest) = y.as_chunks_mut::<BLOCK>();
-    for (first, block) in (0..).step_by(BLOCK).zip(blocks) {
+    let by_eight = evaluate_blocks::<8>(coefficients, theta, y, 0);
+    let first = by_eight + evaluate_blocks::<4>(coefficients, theta, y, by_eight);
+    for (i, y) in (first..).zip(&mut y[first..]) {
+        let column = coefficients[i..].iter().step_by(n);
+        *y = column.rev().fold(0.0, |value, c| value * theta + c);
+    }
+}
+
+/// Evaluates as many whole blocks of states as there are from this one on; returns how many states these are.
+fn evaluate_blocks<const BLOCK: usize>(
+    coefficients: &[f64],
+    theta: f64,
+    y: &mut [f64],
+    from: usize,
+) -> usize {
+    let n = y.len();
+    let (blocks, rest) = y[from..].as_chunks_mut::<BLOCK>();
+    for (first, block) in (from..).step_by(BLOCK).zip(blocks) {
         let mut value = [0.0; BLOCK];
         for row in coefficients.chunks_exact(n).rev() {
             if let Some(row) = row[first..].first_chunk::<BLOCK>() {
@@ -218,11 +234,7 @@ fn evaluate_in_blocks(coefficients: &[f64], theta: f64, y: &mut [f64]) {
         }
         *block = value;
     }
-    let first = n - rest.len();
-    for (i, y) in (first..).zip(rest) {
-        let column = coefficients[i..].iter().step_by(n);
-        *y = column.rev().fold(0.0, |value, c| value * theta + c);
-    }
+    n - from - rest.len()
 }
 
 /// Horner's scheme for few states: the values stay in registers.
@@ -263,7 +275,7 @@ mod tests {
 
     #[test]
     fn columns_are_evaluated_one_like_another() {
-        for n in 1..=11 {
+        for n in 1..=27 {
             let coefficients: Vec<f64> = (0..6 * n)
                 .map(|k| f64::from(k as u32 * 37 % 11) - 5.0)
                 .collect();

@@ -30,6 +30,8 @@ use crate::system::eval_on_side;
 /// 2. [`fill_affine_parts`](Self::fill_affine_parts) fills field, gradients, jumps and rates in time; entries of
 ///    `signs` on the surfaces may be any numbers, the others are -1.0 or +1.0.
 ///
+/// [`refit_affine_parts`](Self::refit_affine_parts) does what the first does, in the space of other parts.
+///
 /// The provided methods suit a black box that is affine in all signs: m + 1 evaluations for m surfaces,
 /// at signs -1 and +1 only, and dense matrices.
 pub trait AffineSigns: PiecewiseSystem {
@@ -43,6 +45,16 @@ pub trait AffineSigns: PiecewiseSystem {
         let mut parts = AffineParts::new(n, surfaces, full.clone(), full);
         parts.solver = SparseSolver::with_noise(self.noise_of_rates());
         Some(parts)
+    }
+
+    /// Makes parts those of other surfaces (increasing); `false`, and they are of no use, if the field is not affine in
+    /// their signs together.
+    fn refit_affine_parts(&self, surfaces: &[usize], parts: &mut AffineParts) -> bool {
+        match self.affine_parts(surfaces) {
+            Some(others) => *parts = others,
+            None => return false,
+        }
+        true
     }
 
     /// Writes f(t, x, s), the gradients and time derivatives of the switching functions, and df/ds_j. Returns
@@ -141,7 +153,7 @@ pub struct SingularSliding {
 /// assert!(parts.multipliers().iter().all(|lambda| (lambda - 0.2).abs() < 1e-9));
 /// # Ok::<(), filippov::FieldError>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct AffineParts {
     surfaces: Vec<usize>,
     /// f(t, x, s) at the signs of the evaluation.
@@ -171,30 +183,37 @@ pub struct AffineParts {
 impl AffineParts {
     /// Space for surfaces with gradients and jumps of these patterns; their values do not matter.
     pub fn new(n: usize, surfaces: &[usize], gradients: SparseRows, jumps: SparseRows) -> Self {
-        let m = surfaces.len();
-        AffineParts {
-            surfaces: surfaces.to_vec(),
-            field: vec![0.0; n],
-            time_rates: vec![0.0; m],
-            normal: SparseProduct::new(&gradients, &jumps),
+        let mut parts = AffineParts {
             gradients,
             jumps,
-            outputs: Vec::new(),
-            signs: vec![0.0; m],
-            rates: vec![0.0; m],
-            multipliers: vec![f64::NAN; m],
-            solver: SparseSolver::default(),
-            is_steady: false,
-            is_formed: false,
-            is_factored: false,
-        }
+            ..AffineParts::default()
+        };
+        parts.refit(n, surfaces);
+        parts
     }
 
-    /// The same where gradients and N are the same at every evaluation: N is formed and factored once.
-    #[must_use]
-    pub fn steady(mut self, is_steady: bool) -> Self {
+    /// Makes the rest fit surfaces whose gradients and jumps have been put in.
+    pub(super) fn refit(&mut self, n: usize, surfaces: &[usize]) {
+        let fill = |values: &mut Vec<f64>, length, value| {
+            values.clear();
+            values.resize(length, value);
+        };
+        let m = surfaces.len();
+        self.surfaces.clear();
+        self.surfaces.extend_from_slice(surfaces);
+        self.normal.find_pattern(&self.gradients, &self.jumps);
+        fill(&mut self.field, n, 0.0);
+        fill(&mut self.time_rates, m, 0.0);
+        fill(&mut self.signs, m, 0.0);
+        fill(&mut self.rates, m, 0.0);
+        fill(&mut self.multipliers, m, f64::NAN);
+        self.is_steady = false;
+        self.restart();
+    }
+
+    /// Says whether gradients and N are the same at every evaluation: N is formed and factored once then.
+    pub(super) fn set_steady(&mut self, is_steady: bool) {
         self.is_steady = is_steady;
-        self
     }
 
     /// Are gradients and N the same at every evaluation?

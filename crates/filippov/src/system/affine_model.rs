@@ -10,6 +10,8 @@ use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, Gradient, Graph, Motion, Node, NodeId, SignDependence,
 };
 
+use smallvec::SmallVec;
+
 use super::affine::AffineParts;
 use super::tiered::TieredProgram;
 use super::Place;
@@ -130,9 +132,9 @@ impl AffineModel {
         }
     }
 
-    /// Space for these surfaces, if the field is affine in their signs together.
-    pub fn parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
-        let mut among = vec![false; self.is_blended.len()];
+    /// Makes parts those of these surfaces, if the field is affine in their signs together.
+    pub fn refit(&self, surfaces: &[usize], parts: &mut AffineParts) -> bool {
+        let mut among: SmallVec<[bool; 64]> = SmallVec::from_elem(false, self.is_blended.len());
         for &j in surfaces {
             among[j] = true;
         }
@@ -140,11 +142,11 @@ impl AffineModel {
             self.is_blended[j] && !self.conflicts[j].iter().any(|&k| among[k as usize])
         };
         if !surfaces.iter().all(fits) {
-            return None;
+            return false;
         }
-        let matrix = |rows: &[Row]| {
+        let fill = |matrix: &mut SparseRows, rows: &[Row]| {
             let n_entries = surfaces.iter().map(|&j| rows[j].len()).sum();
-            let mut matrix = SparseRows::with_capacity(self.n_states, (surfaces.len(), n_entries));
+            matrix.clear_for(self.n_states, (surfaces.len(), n_entries));
             for &j in surfaces {
                 let pattern = rows[j].iter();
                 matrix.push_row(pattern.map(|&(state, value)| match value {
@@ -152,17 +154,17 @@ impl AffineModel {
                     Source::Output(_) => (state, 0.0),
                 }));
             }
-            matrix
         };
-        let (gradients, jumps) = (matrix(&self.gradients), matrix(&self.jumps));
-        let mut parts = AffineParts::new(self.n_states, surfaces, gradients, jumps);
+        fill(&mut parts.gradients, &self.gradients);
+        fill(&mut parts.jumps, &self.jumps);
+        parts.refit(self.n_states, surfaces);
         let own = parts.time_rates.iter_mut().zip(surfaces);
         for (rate, &j) in own {
             if let Source::Constant(value) = self.time_rates[j] {
                 *rate = value;
             }
         }
-        Some(parts)
+        true
     }
 
     /// These surfaces in groups whose signs multiply one another in the field.
@@ -220,7 +222,7 @@ impl AffineModel {
         Some(out[0])
     }
 
-    /// Evaluates what varies of [`parts`](Self::parts); with `anew`, for parts whose jumps have been stretched, everything.
+    /// Evaluates what varies of parts [made to fit](Self::refit); with `anew`, for parts whose jumps have been stretched, everything.
     pub fn fill(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts, anew: bool) {
         let program = self.program.program();
         let mut outputs = std::mem::take(&mut parts.outputs);

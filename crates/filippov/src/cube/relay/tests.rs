@@ -1,5 +1,7 @@
 //! Relay problems: by hand, the cases of `tests/data`, random ones against all modes, chains.
 
+use std::borrow::Cow;
+
 use super::{Pivots, RelayError, RelayProblem, RelaySolution, Uniqueness};
 use crate::cube::smallest_minor;
 use crate::patience::Patience;
@@ -7,10 +9,10 @@ use crate::sparse::SparseRows;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-fn problem(nu: &[f64], n: &SparseRows) -> RelayProblem {
+fn problem(nu: &[f64], n: &SparseRows) -> RelayProblem<'static> {
     RelayProblem {
         nu: nu.to_vec(),
-        n: n.clone(),
+        n: Cow::Owned(n.clone()),
         noise: 1e-11,
     }
 }
@@ -25,7 +27,7 @@ fn solved(nu: &[f64], rows: &[Vec<f64>], before: &[i8]) -> RelaySolution {
 
 /// The solutions of (R) among all 3^m modes, and whether there may be more of them in between: a mode with singular N may
 /// hold a continuum.
-fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
+fn all_relay_modes(problem: &RelayProblem<'_>) -> (Vec<Vec<i8>>, bool) {
     let m = problem.nu.len();
     let known = &mut crate::cube::KnownUniqueness::default();
     let mut pivots = Pivots::new(problem, Patience::endless(), known);

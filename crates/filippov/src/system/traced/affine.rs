@@ -9,8 +9,15 @@ use crate::system::{AffineParts, AffineSigns, Place, Setting, SignStructure};
 
 impl AffineSigns for TracedSystem {
     fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
-        let parts = self.model.affine_signs().parts(surfaces)?;
-        Some(parts.steady(surfaces.iter().all(|&j| self.is_steady(j))))
+        let mut parts = AffineParts::default();
+        let is_affine = self.refit_affine_parts(surfaces, &mut parts);
+        is_affine.then_some(parts)
+    }
+
+    fn refit_affine_parts(&self, surfaces: &[usize], parts: &mut AffineParts) -> bool {
+        let is_affine = self.model.affine_signs().refit(surfaces, parts);
+        parts.set_steady(surfaces.iter().all(|&j| self.is_steady(j)));
+        is_affine
     }
 
     fn fill_affine_parts(
