@@ -520,4 +520,44 @@ mod tests {
         assert_eq!(used.n_evaluations(), new.n_evaluations());
         assert!(!used.restart(&[0, 2], setting));
     }
+
+    #[test]
+    fn signs_that_multiply_have_no_field_in_this_space() {
+        let (system, signs) = (system(), [1.0; 3]);
+        let setting = Setting::of_signs(&signs);
+        let mut used = IntersectionField::new(&system, &[0, 1], setting, &[]);
+        assert!(!used.refit(&[1, 2], setting, &[1.0; 2]));
+    }
+
+    #[test]
+    fn the_space_serves_more_and_fewer_surfaces() {
+        // v_i' = i - 2 - 4 sign(v_i) - sign(v_(i + 1)), each of four bodies pulled at by the next one.
+        let mut g = Graph::new();
+        let (four, v) = (g.constant(4.0), [0, 1, 2, 3].map(|i| g.state(i)));
+        let s = v.map(|v| g.sign(v));
+        let field = (0..4_usize).map(|i| {
+            let (own, pull) = (g.mul(four, s[i]), g.constant(i as f64 - 2.0));
+            let held = g.sub(pull, own);
+            g.sub(held, s[(i + 1) % 4])
+        });
+        let field = field.collect();
+        let system =
+            TracedSystem::new(g, field, Vec::new(), Names::default(), Backend::Auto).unwrap();
+        let signs = [1.0, -1.0, 1.0, -1.0];
+        let setting = Setting::of_signs(&signs);
+        let mut used = IntersectionField::new(&system, &[0, 2], setting, &[]);
+        let sets: [&[usize]; 4] = [&[0, 1, 2, 3], &[1, 3], &[0, 1, 3], &[2, 3]];
+        for set in sets {
+            let kappa: Vec<f64> = (1..=set.len()).map(|k| k as f64).collect();
+            assert!(used.refit(set, setting, &kappa));
+            let mut new = IntersectionField::new(&system, set, setting, &[]).with_scaling(&kappa);
+            let value = |field: &mut IntersectionField| {
+                let (mut x, mut dx) = ([0.0; 4], [0.0; 4]);
+                field.eval(0.2, &mut x, &mut dx).unwrap();
+                (dx, field.multipliers(), field.last_exits().to_vec())
+            };
+            assert_eq!(value(&mut used), value(&mut new));
+            assert_eq!(used.guards(), new.guards());
+        }
+    }
 }
