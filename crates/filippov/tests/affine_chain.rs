@@ -2,8 +2,6 @@
 //! the relay problem, the field by one linear system, without ever forming the fields of all signs.
 #![allow(clippy::unwrap_used)]
 
-use std::borrow::Cow;
-
 use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 use filippov::{PiecewiseSystem, Place, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
@@ -45,8 +43,8 @@ fn released(system: &dyn PiecewiseSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
         .evaluate(affine, &Place::new(0.0, &state, &vec![0.0; d]))
         .unwrap();
     let problem = RelayProblem {
-        nu: parts.nu(),
-        n: Cow::Borrowed(parts.normal()),
+        nu: &parts.nu(),
+        n: parts.normal(),
         noise: system.lie_tolerance(1),
     };
     let found = solve_relay(&problem, &vec![0; d]).unwrap();

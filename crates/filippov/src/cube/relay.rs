@@ -21,10 +21,6 @@
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
-use std::borrow::Cow;
-
-use smallvec::SmallVec;
-
 use super::shared_load::{idle, largest, KnownUniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
@@ -41,12 +37,12 @@ const MOST_PROXIMAL: usize = 30;
 const SOLVED: f64 = 8.0;
 
 /// The data of (R), one entry or row per surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct RelayProblem<'n> {
     /// The rates of the switching functions at s = 0.
-    pub nu: Vec<f64>,
+    pub nu: &'n [f64],
     /// How they depend on the signs.
-    pub n: Cow<'n, SparseRows>,
+    pub n: &'n SparseRows,
     /// Rates below this fraction of the sum of their terms count as zero: `PiecewiseSystem::lie_tolerance(1)`.
     pub noise: f64,
 }
@@ -95,12 +91,11 @@ pub enum RelayError {
 ///
 /// # Example
 /// ```
-/// use std::borrow::Cow;
 /// use filippov::sparse::SparseRows;
 /// use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 /// // Two masses of 1 pushed with 0.5 and 3 against friction of 1, joined by a damper.
 /// let n = SparseRows::from_dense(&[vec![-1.0, 0.2], vec![0.2, -1.0]]);
-/// let problem = RelayProblem { nu: vec![0.5, 3.0], n: Cow::Owned(n), noise: 1e-11 };
+/// let problem = RelayProblem { nu: &[0.5, 3.0], n: &n, noise: 1e-11 };
 /// let found = solve_relay(&problem, &[0, 0])?;
 /// assert_eq!(found.modes, [0, 1]);
 /// assert!((found.signs[0] - 0.7).abs() < 1e-15 && (found.rates[1] - 2.14).abs() < 1e-15);
@@ -125,7 +120,10 @@ pub fn solve_relay_within(
     if !problem.n.is_finite() || !problem.nu.iter().all(|v| v.is_finite()) {
         return Err(RelayError::NotFinite);
     }
-    let mut pivots = Pivots::new(problem, patience, known);
+    let is_idle = problem.idle();
+    let acting = is_idle.contains(&true).then(|| problem.without(&is_idle));
+    let n = acting.as_ref().unwrap_or(problem.n);
+    let mut pivots = Pivots::new(RelayProblem { n, ..*problem }, is_idle, patience, known);
     let state = pivots.only_state().or_else(|| pivots.proximal(before));
     let found = state.and_then(|state| pivots.solution(state));
     let mut solution = found.ok_or(RelayError::Undecided {
@@ -147,7 +145,7 @@ struct State {
 /// The pivots of one problem.
 struct Pivots<'a> {
     /// The problem without the effects of idle surfaces, which are rounding.
-    problem: Cow<'a, RelayProblem<'a>>,
+    problem: RelayProblem<'a>,
     /// The signs of these surfaces have no effect, for instance those of kinks. Each sign follows the rate of its surface.
     is_idle: Vec<bool>,
     uniqueness: Uniqueness,
@@ -164,22 +162,15 @@ struct Pivots<'a> {
 
 impl<'a> Pivots<'a> {
     fn new(
-        problem: &'a RelayProblem<'a>,
+        problem: RelayProblem<'a>,
+        is_idle: Vec<bool>,
         patience: Patience<'a>,
         known: &mut KnownUniqueness,
     ) -> Self {
-        let m = problem.nu.len();
-        let is_idle = idle(&problem.n, |i| problem.rounding_at_ends(i));
-        let mut problem = Cow::Borrowed(problem);
-        if is_idle.contains(&true) {
-            let acts = is_idle.iter().map(|is_idle| f64::from(u8::from(!is_idle)));
-            let acts: Vec<f64> = acts.collect();
-            problem.to_mut().n = Cow::Owned(problem.n.with_columns_scaled(&acts));
-        }
-        let acting: SmallVec<[usize; 16]> = (0..m).filter(|&i| !is_idle[i]).collect();
+        let acting: Vec<usize> = (0..is_idle.len()).filter(|&i| !is_idle[i]).collect();
         let uniqueness = known.of(&problem.n.principal(&acting));
         Pivots {
-            nu: problem.nu.clone(),
+            nu: problem.nu.to_vec(),
             damped: None,
             is_diagonal: problem.n.is_diagonal(),
             n_divisions: 0,
@@ -202,7 +193,7 @@ impl<'a> Pivots<'a> {
         if self.uniqueness == Uniqueness::Certain {
             return self.pivot(modes);
         }
-        let damp = |i| match largest(&self.problem.n, i) {
+        let damp = |i| match largest(self.problem.n, i) {
             0.0 => 1.0,
             size => DEFINITE_PIVOT.sqrt() * size,
         };
@@ -233,7 +224,7 @@ impl<'a> Pivots<'a> {
                 return None;
             }
             let state = self.state(&modes).ok()?;
-            let wrong: SmallVec<[usize; 16]> = (0..modes.len())
+            let wrong: Vec<usize> = (0..modes.len())
                 .filter(|&i| self.is_wrong(&state, i))
                 .collect();
             if wrong.is_empty() {
@@ -253,7 +244,7 @@ impl<'a> Pivots<'a> {
     }
 
     fn n(&self) -> &SparseRows {
-        self.damped.as_ref().unwrap_or(&self.problem.n)
+        self.damped.as_ref().unwrap_or(self.problem.n)
     }
 
     /// The mode of an entry in a wrong state. A jump from one side to the other is allowed only where many states
@@ -299,7 +290,7 @@ impl<'a> Pivots<'a> {
         let m = modes.len();
         let mut signs: Vec<f64> = modes.iter().map(|&mode| f64::from(mode)).collect();
         let sliding = (0..m).filter(|&i| modes[i] == 0);
-        let n = self.damped.as_ref().unwrap_or(&self.problem.n);
+        let n = self.damped.as_ref().unwrap_or(self.problem.n);
         self.n_pivots += 1;
         if self.is_diagonal {
             for i in sliding {
@@ -392,7 +383,19 @@ impl RelayProblem<'_> {
         self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs)) + EPS * of_signs
     }
 
-    /// The same where all signs have size 1.
+    /// The surfaces whose sign has no effect but rounding.
+    fn idle(&self) -> Vec<bool> {
+        idle(self.n, |i| self.rounding_at_ends(i))
+    }
+
+    /// N without the effects of these surfaces.
+    fn without(&self, is_idle: &[bool]) -> SparseRows {
+        let acts = is_idle.iter().map(|is_idle| f64::from(u8::from(!is_idle)));
+        let acts: Vec<f64> = acts.collect();
+        self.n.with_columns_scaled(&acts)
+    }
+
+    /// A rate below this is rounding where all signs have size 1.
     fn rounding_at_ends(&self, i: usize) -> f64 {
         let of_signs: f64 = self.n.row(i).map(|(_, value)| value.abs()).sum();
         self.noise * (self.nu[i].abs() + of_signs) + EPS * of_signs
@@ -400,7 +403,7 @@ impl RelayProblem<'_> {
 
     /// How much of a sign is rounding, if the rates are known up to `rounding`.
     fn slack(&self, rounding: f64, i: usize) -> f64 {
-        let size = largest(&self.n, i);
+        let size = largest(self.n, i);
         self.noise + if size > 0.0 { rounding / size } else { 1.0 }
     }
 }

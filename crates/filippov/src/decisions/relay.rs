@@ -1,7 +1,5 @@
 //! Meetings of surfaces where the field is affine in their signs: one relay problem, whatever their number.
 
-use std::borrow::Cow;
-
 use super::choice::choose;
 use super::consistency::agreeing_with_own_signs;
 use super::germ::{evaluate, surfaces_left, Found};
@@ -189,22 +187,23 @@ fn relay_at(
     let entries = meeting.mode.entries();
     let before: Vec<i8> = meeting.surfaces.iter().map(|&j| entries[j]).collect();
     let (gradients, noise) = (&parts.gradients, at.system.lie_tolerance(1));
+    let nu = parts.nu();
     let problem = RelayProblem {
-        nu: parts.nu(),
-        n: Cow::Borrowed(parts.normal()),
+        nu: &nu,
+        n: parts.normal(),
         noise,
     };
     let known = &mut at.known.borrow_mut();
     let Ok(mut solution) = solve_relay_within(&problem, &before, at.patience, known) else {
         return Ok(None);
     };
-    if !stay_together(&problem.n, gradients, &solution.loops) {
+    if !stay_together(problem.n, gradients, &solution.loops) {
         solution.uniqueness = Uniqueness::Unknown;
     }
     let speed = 1.0 + dot(&parts.field, &parts.field).sqrt();
     let sum = |rows: &SparseRows, i: usize| rows.row(i).map(|(_, v)| v.abs()).sum::<f64>();
     let may_be_tangent = (0..before.len()).any(|i| {
-        let size = problem.nu[i].abs() + sum(&problem.n, i);
+        let size = problem.nu[i].abs() + sum(problem.n, i);
         size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
     });
     Ok(Some(Posed {

@@ -1,7 +1,5 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
-use std::borrow::Cow;
-
 use super::canopy::root_ends;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
@@ -146,8 +144,8 @@ impl<'a> AffineLaw<'a> {
         let entries = || shared.reserves.iter().zip(&shared.signs);
         if entries().any(|(reserve, sign)| reserve.is_some() && sign.abs() > 1.0) {
             let problem = RelayProblem {
-                nu: self.parts.nu(),
-                n: Cow::Borrowed(self.parts.normal()),
+                nu: &self.parts.nu(),
+                n: self.parts.normal(),
                 noise: self.system.noise_of_rates(),
             };
             if let Ok(inside) = solve_relay(&problem, &vec![0; here.len()]) {

@@ -14,6 +14,7 @@ use super::{
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
+use crate::page::IS_PAGE;
 use crate::system::{OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::EPS;
 
@@ -107,7 +108,7 @@ impl<'a> ModeField<'a> {
         sliding: &[usize],
         setting: Setting<'_>,
     ) -> Self {
-        if let Some(ModeField::Intersection(mut field)) = spare {
+        if let Some(ModeField::Intersection(mut field)) = spare.filter(|_| !IS_PAGE) {
             let is_one = sliding.len() > 1 && law.rule == SlidingRule::Canopy;
             if is_one && field.refit(sliding, setting, &law.scaling(sliding)) {
                 return ModeField::Intersection(field);

@@ -2,8 +2,6 @@
 
 use std::borrow::Cow;
 
-use smallvec::SmallVec;
-
 /// A sparse matrix by rows. The pattern is kept while values change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparseRows {
@@ -48,6 +46,7 @@ impl SparseRows {
     }
 
     /// Takes all rows out, and makes room for so many rows and entries.
+    #[inline(never)]
     pub(crate) fn clear_for(&mut self, n_columns: usize, (rows, entries): (usize, usize)) {
         self.clear(n_columns);
         self.starts.reserve(rows);
@@ -271,27 +270,28 @@ impl SparseProduct {
     pub fn find_pattern(&mut self, a: &SparseRows, b: &SparseRows) {
         let SparseProduct { terms, matrix } = self;
         // Column, row and place of the entries of B, one column after the other.
-        let mut users: SmallVec<[_; 16]> = SmallVec::new();
+        let mut users = Vec::with_capacity(b.n_entries());
         for j in 0..b.n_rows() {
             let entries = (b.starts[j] as u32..).zip(b.columns(j));
             users.extend(entries.map(|(entry, &column)| (column, j, entry)));
         }
         users.sort_unstable();
-        let users = &users[..];
         let room = (a.n_rows(), a.n_entries().max(a.n_rows()));
         matrix.clear_for(b.n_rows(), room);
         terms.clear();
         terms.reserve(a.n_entries());
-        let mut met: SmallVec<[_; 16]> = SmallVec::new();
+        let mut met = Vec::new();
         for i in 0..a.n_rows() {
-            let users_of = |column: usize| {
+            met.clear();
+            for (entry, &column) in (a.starts[i] as u32..).zip(a.columns(i)) {
                 let first = users.partition_point(|user| user.0 < column);
-                let users = users[first..].iter();
-                users.take_while(move |user| user.0 == column)
-            };
+                let users = users[first..].iter().take_while(|user| user.0 == column);
+                met.extend(users.map(|&(_, j, other)| (j, entry, other)));
+            }
+            met.sort_unstable();
             let start = matrix.n_entries();
             let mut diagonal = (i < b.n_rows()).then_some(i);
-            let mut add = |j: usize, entry: u32, other: u32| {
+            for &(j, entry, other) in &met {
                 if let Some(i) = diagonal.take_if(|i| *i <= j) {
                     matrix.columns.push(i);
                 }
@@ -299,18 +299,6 @@ impl SparseProduct {
                     matrix.columns.push(j);
                 }
                 terms.push((matrix.columns.len() as u32 - 1, entry, other));
-            };
-            let first = a.starts[i] as u32;
-            if let &[column] = a.columns(i) {
-                users_of(column).for_each(|&(_, j, other)| add(j, first, other));
-            } else {
-                met.clear();
-                for (entry, &column) in (first..).zip(a.columns(i)) {
-                    met.extend(users_of(column).map(|&(_, j, other)| (j, entry, other)));
-                }
-                met.sort_unstable();
-                met.iter()
-                    .for_each(|&(j, entry, other)| add(j, entry, other));
             }
             matrix.columns.extend(diagonal);
             matrix.starts.push(matrix.columns.len());

@@ -2,6 +2,8 @@
 
 use smallvec::SmallVec;
 
+use crate::page::IS_PAGE;
+
 /// How the rows of coefficients make a polynomial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
@@ -206,7 +208,10 @@ pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64,
 /// Horner's scheme for many states, some at a time.
 fn evaluate_in_blocks(coefficients: &[f64], theta: f64, y: &mut [f64]) {
     let n = y.len();
-    let by_eight = evaluate_blocks::<8>(coefficients, theta, y, 0);
+    let by_eight = match IS_PAGE {
+        true => 0,
+        false => evaluate_blocks::<8>(coefficients, theta, y, 0),
+    };
     let first = by_eight + evaluate_blocks::<4>(coefficients, theta, y, by_eight);
     for (i, y) in (first..).zip(&mut y[first..]) {
         let column = coefficients[i..].iter().step_by(n);

@@ -123,6 +123,13 @@ pub trait AffineSigns: PiecewiseSystem {
     }
 }
 
+/// Makes values so many equal ones.
+#[inline(never)]
+fn fill(values: &mut Vec<f64>, length: usize, value: f64) {
+    values.clear();
+    values.resize(length, value);
+}
+
 /// Sliding is not determined: signs of these surfaces can change together without any effect on dh/dt.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the multipliers of the surfaces {surfaces:?} are not determined: their jumps are dependent there")]
@@ -194,10 +201,6 @@ impl AffineParts {
 
     /// Makes the rest fit surfaces whose gradients and jumps have been put in.
     pub(super) fn refit(&mut self, n: usize, surfaces: &[usize]) {
-        let fill = |values: &mut Vec<f64>, length, value| {
-            values.clear();
-            values.resize(length, value);
-        };
         let m = surfaces.len();
         self.surfaces.clear();
         self.surfaces.extend_from_slice(surfaces);

@@ -10,8 +10,6 @@ use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, Gradient, Graph, Motion, Node, NodeId, SignDependence,
 };
 
-use smallvec::SmallVec;
-
 use super::affine::AffineParts;
 use super::tiered::TieredProgram;
 use super::Place;
@@ -134,7 +132,7 @@ impl AffineModel {
 
     /// Makes parts those of these surfaces, if the field is affine in their signs together.
     pub fn refit(&self, surfaces: &[usize], parts: &mut AffineParts) -> bool {
-        let mut among: SmallVec<[bool; 64]> = SmallVec::from_elem(false, self.is_blended.len());
+        let mut among = vec![false; self.is_blended.len()];
         for &j in surfaces {
             among[j] = true;
         }

@@ -1,7 +1,5 @@
 //! Relay problems: by hand, the cases of `tests/data`, random ones against all modes, chains.
 
-use std::borrow::Cow;
-
 use super::{Pivots, RelayError, RelayProblem, RelaySolution, Uniqueness};
 use crate::cube::smallest_minor;
 use crate::patience::Patience;
@@ -9,10 +7,10 @@ use crate::sparse::SparseRows;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-fn problem(nu: &[f64], n: &SparseRows) -> RelayProblem<'static> {
+fn problem<'n>(nu: &'n [f64], n: &'n SparseRows) -> RelayProblem<'n> {
     RelayProblem {
-        nu: nu.to_vec(),
-        n: Cow::Owned(n.clone()),
+        nu,
+        n,
         noise: 1e-11,
     }
 }
@@ -30,7 +28,10 @@ fn solved(nu: &[f64], rows: &[Vec<f64>], before: &[i8]) -> RelaySolution {
 fn all_relay_modes(problem: &RelayProblem<'_>) -> (Vec<Vec<i8>>, bool) {
     let m = problem.nu.len();
     let known = &mut crate::cube::KnownUniqueness::default();
-    let mut pivots = Pivots::new(problem, Patience::endless(), known);
+    let is_idle = problem.idle();
+    let n = &problem.without(&is_idle);
+    let acting = RelayProblem { n, ..*problem };
+    let mut pivots = Pivots::new(acting, is_idle, Patience::endless(), known);
     let (mut found, mut has_singular) = (Vec::new(), false);
     for pattern in 0..3_usize.pow(m as u32) {
         let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
