@@ -195,6 +195,7 @@ pub(crate) fn derivative(
 pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
     match basis {
         Basis::Nested => evaluate_nested(coefficients, n, theta, y),
+        Basis::Powers if IS_PAGE => evaluate_in_blocks(coefficients, theta, y),
         Basis::Powers => match n {
             1 => evaluate_powers::<1>(coefficients, theta, y),
             2 => evaluate_powers::<2>(coefficients, theta, y),
@@ -207,39 +208,33 @@ pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64,
 
 /// Horner's scheme for many states, some at a time.
 fn evaluate_in_blocks(coefficients: &[f64], theta: f64, y: &mut [f64]) {
-    let n = y.len();
-    let by_eight = match IS_PAGE {
-        true => 0,
-        false => evaluate_blocks::<8>(coefficients, theta, y, 0),
-    };
-    let first = by_eight + evaluate_blocks::<4>(coefficients, theta, y, by_eight);
-    for (i, y) in (first..).zip(&mut y[first..]) {
-        let column = coefficients[i..].iter().step_by(n);
-        *y = column.rev().fold(0.0, |value, c| value * theta + c);
+    let mut first = 0;
+    while first < y.len() {
+        first += match y.len() - first {
+            8.. if !IS_PAGE => evaluate_block::<8>(coefficients, theta, y, first),
+            4.. if !IS_PAGE => evaluate_block::<4>(coefficients, theta, y, first),
+            _ => evaluate_block::<1>(coefficients, theta, y, first),
+        };
     }
 }
 
-/// Evaluates as many whole blocks of states as there are from this one on; returns how many states these are.
-fn evaluate_blocks<const BLOCK: usize>(
+/// The same for `N` states from this one on; returns their number.
+fn evaluate_block<const N: usize>(
     coefficients: &[f64],
     theta: f64,
     y: &mut [f64],
-    from: usize,
+    first: usize,
 ) -> usize {
-    let n = y.len();
-    let (blocks, rest) = y[from..].as_chunks_mut::<BLOCK>();
-    for (first, block) in (from..).step_by(BLOCK).zip(blocks) {
-        let mut value = [0.0; BLOCK];
-        for row in coefficients.chunks_exact(n).rev() {
-            if let Some(row) = row[first..].first_chunk::<BLOCK>() {
-                for i in 0..BLOCK {
-                    value[i] = value[i] * theta + row[i];
-                }
+    let mut value = [0.0; N];
+    for row in coefficients.chunks_exact(y.len()).rev() {
+        if let Some(row) = row[first..].first_chunk::<N>() {
+            for i in 0..N {
+                value[i] = value[i] * theta + row[i];
             }
         }
-        *block = value;
     }
-    n - from - rest.len()
+    y[first..first + N].copy_from_slice(&value);
+    N
 }
 
 /// Horner's scheme for few states: the values stay in registers.

@@ -6,6 +6,7 @@ use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::motion::{OwnJets, SmoothField};
+use crate::page::IS_PAGE;
 use crate::powers::power;
 use crate::tolerances::{
     ERRORS_OF_STEPS, TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP,
@@ -263,8 +264,8 @@ impl Taylor {
         let mut first = 0;
         while first < self.n {
             first += match self.n - first {
-                8.. => self.sum_columns::<8>(y, first),
-                4.. => self.sum_columns::<4>(y, first),
+                8.. if !IS_PAGE => self.sum_columns::<8>(y, first),
+                4.. if !IS_PAGE => self.sum_columns::<4>(y, first),
                 _ => self.sum_columns::<1>(y, first),
             };
         }
