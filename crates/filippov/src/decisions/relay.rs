@@ -38,13 +38,16 @@ pub(super) fn decide_by_relay(
     let Some(affine) = at.system.affine_signs() else {
         return Ok(None);
     };
-    let mut parts = at.space.take();
-    let decided = match affine.refit_affine_parts(surfaces, &mut parts) {
-        true => decide_with(&mut parts, at, notes, meeting),
-        false => Ok(None),
+    // A decision within another one has its own.
+    let (mut space, mut own) = (at.space.try_borrow_mut(), None);
+    let parts = match &mut space {
+        Ok(space) => &mut **space,
+        Err(_) => own.insert(AffineParts::default()),
     };
-    at.space.replace(parts);
-    decided
+    match affine.refit_affine_parts(surfaces, parts) {
+        true => decide_with(parts, at, notes, meeting),
+        false => Ok(None),
+    }
 }
 
 /// The same with space for the fields around the point.

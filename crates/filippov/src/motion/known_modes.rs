@@ -31,7 +31,9 @@ impl ActiveSurfaces {
     pub fn new(system: &dyn PiecewiseSystem, signs: &[f64], sliding: &[usize]) -> Self {
         let mut active = SmallVec::from_elem(false, signs.len());
         system.active(signs, sliding, &mut active);
-        let awake = (0..active.len()).filter(|&j| active[j]).collect();
+        let n_active = active.iter().filter(|active| **active).count();
+        let mut awake = SmallVec::with_capacity(n_active);
+        awake.extend((0..active.len()).filter(|&j| active[j]));
         ActiveSurfaces {
             are_all: active.iter().all(|active| *active),
             active,
