@@ -276,6 +276,26 @@ def test_bodies_of_a_stack_never_pass_through_one_another_unnoticed(e1, e2, m):
         assert "Stopped at" in sol.message
 
 
+@pytest.mark.parametrize("method", ["auto", "DOP853", "DOPRI5"])
+def test_a_body_lifts_off_where_sliding_begins_at_the_end_of_its_multiplier(method):
+    """The surface x[2] = 0 is reached at t = 0, where the motion in x[2] > 0 is tangent: lambda = 1 - 24 t.
+
+    The force on the body in x[0] changes from -4 to 4 lambda + 3 t there: x[0] = 2 t^2 - 15.5 t^3.
+    """
+
+    def field(t, x):
+        s = np.sign(x[2])
+        return [x[1], x[2] + 3 * t + 4 * s, 0.5 + 3 * x[3] - 0.5 * s, -4.0]
+
+    stop = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.5 * x[1], x[2], x[3]], direction="down")
+    sol = fl.solve_ivp(field, (-0.1, 0.08), [0.0, 0.0, -0.16, 0.4], resets=stop, method=method)
+    assert sol.success
+    first, second = sol.segments[:2]
+    assert [str(first.mode), str(second.mode)] == ["-0", "0+"]
+    assert abs(second.t_start) < 1e-12
+    assert np.allclose(sol.y[:, -1], [2 * 0.08**2 - 15.5 * 0.08**3, 0.0224, 0.0, -0.32], rtol=0, atol=1e-9)
+
+
 def test_resets_that_trigger_each_other_for_ever_end_the_run():
     resets = [
         fl.Reset(lambda t, x: x[0] - 1.0, lambda t, x: [-2.0], direction=1, name="down"),

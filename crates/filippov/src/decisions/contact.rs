@@ -1,7 +1,7 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
 use super::choice::choose;
-use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::point::{Decided, Left, Lefts, Next, Notes, Point, Values};
 use super::trial::{try_mode, Trial};
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -124,13 +124,21 @@ fn begin(
         [] => VANISHING_GERM,
         _ => AT_SIDE,
     };
+    // The values at both ends of a multiplier add up to the size that they are measured by.
+    let pairs = field.last_exits().chunks(2);
+    let sizes: Values = pairs
+        .map(|pair| pair.iter().map(|v| v.abs()).sum())
+        .collect();
     let mut is_clear = true;
     for (i, (guard, exit)) in field.guards().iter().zip(field.last_exits()).enumerate() {
         if guard.surface_held().is_some_and(is_located) {
             is_clear = false;
             continue;
         }
-        let noise = field.noise_of_exit(i) * rounding / VANISHING_GERM;
+        let noise = match field {
+            ModeField::Contact(_) => field.noise_of_exit(i) * rounding / VANISHING_GERM,
+            _ => rounding * sizes[i / 2],
+        };
         if exit.is_nan() || *exit < -noise {
             return Ok(Trial::Ends);
         }

@@ -215,7 +215,7 @@ impl AffineParts {
     }
 
     /// Says whether gradients and N are the same at every evaluation: N is formed and factored once then.
-    pub(super) fn set_steady(&mut self, is_steady: bool) {
+    pub fn set_steady(&mut self, is_steady: bool) {
         self.is_steady = is_steady;
     }
 
