@@ -40,7 +40,7 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub policy: Policy<'a>,
     /// What is known of the equations at meetings.
     pub known: &'p RefCell<KnownUniqueness>,
-    /// For the fields around a meeting: that of the decision before.
+    /// Space for the fields around a meeting, which the decision before had too.
     pub space: &'p RefCell<AffineParts>,
     /// How long the caller waits.
     pub patience: Patience<'p>,

@@ -38,27 +38,15 @@ pub(super) fn decide_by_relay(
     let Some(affine) = at.system.affine_signs() else {
         return Ok(None);
     };
-    // A decision within another one has its own.
+    // A decision that another one asks for has its own.
     let (mut space, mut own) = (at.space.try_borrow_mut(), None);
     let parts = match &mut space {
         Ok(space) => &mut **space,
         Err(_) => own.insert(AffineParts::default()),
     };
-    match affine.refit_affine_parts(surfaces, parts) {
-        true => decide_with(parts, at, notes, meeting),
-        false => Ok(None),
+    if !affine.refit_affine_parts(surfaces, parts) {
+        return Ok(None);
     }
-}
-
-/// The same with space for the fields around the point.
-fn decide_with(
-    parts: &mut AffineParts,
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    let (mode, surfaces) = (meeting.mode, meeting.surfaces);
-    let is_event = matches!(meeting.how, How::Event(_));
     let mut found = relay_at(at, notes, meeting, parts, false)?;
     let is_open = |posed: &Posed| {
         let found = &posed.solution;
