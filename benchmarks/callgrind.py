@@ -3,6 +3,8 @@
 A script starts itself again under valgrind, with an argument that names what is counted; there it hands its
 calls to `be_counted`. Each call is made many times before, so that programs are native code, and then some
 times in two halves, which should agree.
+
+Allocations by mimalloc are found by the names of its functions, so the extension has to have its symbols.
 """
 
 from __future__ import annotations
