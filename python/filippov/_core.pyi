@@ -9,6 +9,7 @@ from typing_extensions import Self
 
 __all__ = [
     "Builder",
+    "HeldItinerary",
     "HeldMotions",
     "ManualClock",
     "ModeBounds",
@@ -307,6 +308,13 @@ class ModeBounds:
     def over(self, low: _Array, high: _Array, p: _Array) -> tuple[_Array, _Array, _Array]: ...
 
 @final
+class HeldItinerary:
+    def __new__(
+        cls,
+        rows: Sequence[tuple[Sequence[int], Sequence[float], _Guard | None, Sequence[int], float, float]],
+    ) -> Self: ...
+
+@final
 class HeldMotions:
     def __new__(
         cls,
@@ -318,23 +326,21 @@ class HeldMotions:
         actions: Sequence[Any],
         parameters: Sequence[int],
     ) -> Self: ...
-    def leg(
+    def leg(self, mode: Sequence[int], q: Sequence[float], t0: float, x: _Array, t1: float) -> _Array: ...
+    def equations(
         self,
-        mode: Sequence[int],
-        q: Sequence[float],
+        itinerary: HeldItinerary,
+        starts: _Array,
+        durations: _Array,
         t0: float,
-        x: _Array,
-        t1: float,
-        places: int = 0,
-        ending: int | None = None,
-    ) -> tuple[_Array, _Array, list[_Array], _Array, _Array, tuple[float, _Array] | None]: ...
+        is_free_in_time: bool,
+        places: int,
+    ) -> tuple[_Array, _Array, _Array, tuple[Any, ...], list[tuple[int, int, int, list[float]]]]: ...
     def guards(self, mode: Sequence[int], q: Sequence[float]) -> list[_Guard]: ...
     def at(
         self, mode: Sequence[int], q: Sequence[float], t: float, x: _Array
     ) -> tuple[_Array, _Array, _Array, _Array]: ...
-    def act(
-        self, index: int, mode: Sequence[int], q: Sequence[float], t: float, x: _Array
-    ) -> tuple[_Array, list[float], _Array | None, _Array, tuple[float, _Array] | None]: ...
+    def act(self, index: int, mode: Sequence[int], q: Sequence[float], t: float, x: _Array) -> _Array: ...
 
 def solve(
     system: TracedSystem | OpaqueSystem | SignedSystem,

@@ -2,20 +2,24 @@
 
 use std::sync::Arc;
 
+use filippov::action::Actions;
 use filippov::derivative::{Extended, Extension, HeldMotion};
 use filippov::motion::{Guard, RootEnd};
-use filippov::{leg, Gradient, InstantRecord, LegError, Mode, Options, Over, Reached, Stop};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use filippov::{
+    equations, state_after, Dip, Equations, GuardRates, InstantRecord, ItineraryError,
+    ItineraryLeg, LegEnd, Mode, Options, Passage, PiecewiseSystem, Reached, Unknowns,
+};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::conversion::columns;
 use crate::prepared_run::{ActionRow, PreparedRun};
 use crate::solve::RunOptions;
 use crate::systems::{raised, refused, TracedSystem};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
+type Cube<'py> = Bound<'py, PyArray3<f64>>;
 type Given<'py> = PyReadonlyArray1<'py, f64>;
 
 /// What ends a motion: its kind, the surface (-1: none), and the end of the multiplier (0: none).
@@ -45,6 +49,82 @@ pub fn guard_row(guard: Guard) -> GuardRow {
     }
 }
 
+fn read_guard(kind: &str, surface: isize, end: i8) -> PyResult<Guard> {
+    match kind {
+        "surface" => Ok(Guard::Surface(surface as usize)),
+        "multiplier" => Ok(Guard::Multiplier {
+            surface: surface as usize,
+            end,
+        }),
+        "force" => Ok(Guard::Force(surface as usize)),
+        "fold" => Ok(Guard::Root(RootEnd::Fold)),
+        "stability" => Ok(Guard::Root(RootEnd::Stability)),
+        _ => Err(PyValueError::new_err(format!(
+            "guard: unknown kind {kind:?}"
+        ))),
+    }
+}
+
+/// Asks for signals: an error is left for the caller to take.
+fn interrupt(py: Python<'_>) -> impl FnMut(Reached) -> bool + '_ {
+    move |_| {
+        py.check_signals().is_err_and(|raised| {
+            raised.restore(py);
+            true
+        })
+    }
+}
+
+/// The equations of an itinerary as arrays.
+fn rows_of<'py>(py: Python<'py>, found: Equations) -> PyResult<EquationRows<'py>> {
+    let passages = &found.passages;
+    let (m, n, size) = (
+        passages.len(),
+        passages[0].after.len(),
+        found.residual.len(),
+    );
+    let table = |values: Vec<f64>, rows: usize| {
+        let columns = values.len() / rows;
+        PyArray1::from_vec(py, values).reshape([rows, columns])
+    };
+    let all = |of: fn(&Passage) -> &[f64]| passages.iter().flat_map(of).copied().collect();
+    let width = found.jacobian.len() / size - size + 1 + n;
+    let unknown = vec![f64::NAN; width];
+    let row = |passage: &Passage| passage.row.clone().unwrap_or_else(|| unknown.clone());
+    let by_state: Vec<f64> = all(|passage| passage.leg.by_state());
+    let velocities: Vec<f64> = passages
+        .iter()
+        .flat_map(|passage| passage.leg.velocities.concat())
+        .collect();
+    let map = |passage: &Passage| {
+        let rows = passage.map.as_ref()?;
+        Some(PyArray2::from_vec2(py, rows).map_err(Into::into))
+    };
+    let maps: PyResult<_> = passages.iter().map(|p| map(p).transpose()).collect();
+    let rows = (
+        passages.iter().map(|passage| passage.t).collect(),
+        table(all(|passage| &passage.leg.x), m)?,
+        PyArray1::from_vec(py, by_state).reshape([m, n, n])?,
+        PyArray1::from_vec(py, velocities).reshape([m, 2, n])?,
+        table(passages.iter().flat_map(row).collect(), m)?,
+        table(all(|passage| &passage.after), m)?,
+        maps?,
+        passages.iter().map(|passage| passage.q.clone()).collect(),
+        passages
+            .iter()
+            .map(|passage| passage.sides.clone())
+            .collect(),
+    );
+    let dip = |dip: &Dip| (dip.leg, dip.guard, dip.number, dip.times);
+    Ok((
+        PyArray1::from_slice(py, &found.residual),
+        table(found.jacobian, size)?,
+        table(found.monodromy, n)?,
+        rows,
+        found.dips.iter().map(dip).collect(),
+    ))
+}
+
 /// An instant as a row.
 pub fn instant_row<'py>(py: Python<'py>, record: &InstantRecord) -> InstantRow<'py> {
     (
@@ -61,25 +141,68 @@ pub fn instant_row<'py>(py: Python<'py>, record: &InstantRecord) -> InstantRow<'
     )
 }
 
-/// The derivatives of a function of the end of a motion, by the states and the time at its start, its duration and the parameters.
-fn along(gradient: &Gradient, end: &[Vec<f64>]) -> Vec<f64> {
-    let n = end.len();
-    let (by_state, by_parameters) = gradient.state.split_at(n);
-    let itself = std::iter::repeat_n(&0.0, n)
-        .chain([&gradient.time; 2])
-        .chain(by_parameters);
-    let through = |column: usize| -> f64 {
-        let entries = by_state.iter().zip(end);
-        entries.map(|(entry, row)| entry * row[column]).sum()
-    };
-    itself
-        .enumerate()
-        .map(|(column, own)| own + through(column))
-        .collect()
+/// A leg: its mode, the discrete states, what ends it, the actions done there, how many times as long it lasts as the next one that
+/// goes on with it, and the time of its end. A guard ends it, or a share, or a time; NaN and `None` are no such things.
+type LegRow = (
+    Vec<i8>,
+    Vec<f64>,
+    Option<(String, isize, i8)>,
+    Vec<usize>,
+    f64,
+    f64,
+);
+
+/// What happens to the legs, in the place of each: the time of its end, the state there, the columns of its derivative by that at the
+/// start, the velocities at both ends, the derivatives of the equation of its end by the time, the states and the parameters (NaN: nothing ends
+/// it), the state behind it, the derivatives of that (or none), the discrete states behind it, and the values and rates of the
+/// guards before and behind it (none: they are not known).
+type PassageRows<'py> = (
+    Vec<f64>,
+    Rows<'py>,
+    Cube<'py>,
+    Cube<'py>,
+    Rows<'py>,
+    Rows<'py>,
+    Vec<Option<Rows<'py>>>,
+    Vec<Vec<f64>>,
+    Vec<Option<[GuardRates; 2]>>,
+);
+
+/// A minimum of a guard near zero: its leg, its guard, its number, and the times before it, of it and behind it.
+type DipRow = (usize, usize, usize, [f64; 3]);
+
+/// The residual, its derivatives, the monodromy matrix, what happens to the legs, and the minima of guards.
+type EquationRows<'py> = (
+    Vector<'py>,
+    Rows<'py>,
+    Rows<'py>,
+    PassageRows<'py>,
+    Vec<DipRow>,
+);
+
+/// The legs of an itinerary.
+#[pyclass(frozen, module = "filippov._core")]
+pub struct HeldItinerary {
+    legs: Vec<ItineraryLeg>,
 }
 
-fn by_time_and_state(gradient: &Gradient) -> Vec<f64> {
-    [&[gradient.time], &gradient.state[..]].concat()
+#[pymethods]
+impl HeldItinerary {
+    #[new]
+    fn new(rows: Vec<LegRow>) -> PyResult<Self> {
+        let leg = |(mode, q, guard, acts, share, time): LegRow| -> PyResult<ItineraryLeg> {
+            let end = match guard {
+                Some((kind, surface, end)) => LegEnd::Guard(read_guard(&kind, surface, end)?),
+                None if !share.is_nan() => LegEnd::Cut(share),
+                None if !time.is_nan() => LegEnd::Time(time),
+                None => LegEnd::Open,
+            };
+            let mode = Mode::new(mode);
+            Ok(ItineraryLeg { mode, q, end, acts })
+        };
+        let legs: PyResult<_> = rows.into_iter().map(leg).collect();
+        Ok(HeldItinerary { legs: legs? })
+    }
 }
 
 /// The motions of a system with these parameters, held in any mode.
@@ -114,12 +237,7 @@ impl HeldMotions {
         })
     }
 
-    /// The motion over a time: the state at its end; its derivative by the states and the time at its start, its duration and the
-    /// parameters; the velocities at both ends; times with the values of the guards there; and the guard of a number at its end,
-    /// with its derivatives by the time, the states and the parameters. Its derivatives by what the motion depends on are then a
-    /// last row below those of the state.
-    #[allow(clippy::type_complexity, clippy::too_many_arguments)]
-    #[pyo3(signature = (mode, q, t0, x, t1, places=0, ending=None))]
+    /// The state to which a motion leads in a time.
     fn leg<'py>(
         &self,
         py: Python<'py>,
@@ -128,82 +246,47 @@ impl HeldMotions {
         t0: f64,
         x: Given<'_>,
         t1: f64,
-        places: usize,
-        ending: Option<usize>,
-    ) -> PyResult<(
-        Vector<'py>,
-        Rows<'py>,
-        [Vector<'py>; 2],
-        Vector<'py>,
-        Rows<'py>,
-        Option<(f64, Vector<'py>)>,
-    )> {
+    ) -> PyResult<Vector<'py>> {
         let (mode, x) = (Mode::new(mode), x.as_slice()?.to_vec());
-        let found = self.with(&q, |system, extended, actions| {
-            let over = Over {
-                span: (t0, t1),
-                start: &x,
-                places,
-                ending,
-            };
+        let mut actions = self.prepared.actions();
+        actions.discrete = q;
+        let of = (self.system()?, &actions);
+        let found = state_after(of, &self.options, &mode, ((t0, t1), &x), &mut interrupt(py));
+        Ok(PyArray1::from_vec(py, self.checked(py, found)?))
+    }
+
+    /// The equations of an itinerary at these unknowns: the states at the starts of its legs one after the other, how long they
+    /// last, and when the first one starts. A leg that cannot be followed is named in a `ValueError`.
+    fn equations<'py>(
+        &self,
+        py: Python<'py>,
+        itinerary: &HeldItinerary,
+        starts: Given<'_>,
+        durations: Given<'_>,
+        t0: f64,
+        is_free_in_time: bool,
+        places: usize,
+    ) -> PyResult<EquationRows<'py>> {
+        let at = Unknowns {
+            starts: starts.as_slice()?,
+            durations: durations.as_slice()?,
+            t0,
+            is_free_in_time,
+            places,
+        };
+        let legs = &itinerary.legs;
+        let fits = !legs.is_empty() && at.durations.len() == legs.len();
+        if !fits || at.starts.len() != legs.len() * self.system()?.n_states() {
+            return Err(PyValueError::new_err(
+                "the unknowns do not fit the itinerary",
+            ));
+        }
+        let found = self.with(&[], |system, extended, actions| {
             let of = (system, extended, actions);
-            let mut interrupt = |_: Reached| {
-                py.check_signals().is_err_and(|raised| {
-                    raised.restore(py);
-                    true
-                })
-            };
-            let found = leg(of, &self.options, (&mode, &q), over, &mut interrupt);
-            found.map_err(|error| match error {
-                LegError::Argument(error) => refused(error),
-                LegError::Raised(error) => raised(error),
-            })
+            let found = equations(of, &self.options, legs, at, &mut interrupt(py));
+            self.checked(py, found)
         })?;
-        if let Some(raised) = PyErr::take(py) {
-            return Err(raised);
-        }
-        if !matches!(found.stop, Stop::End) {
-            let name = |j: usize| self.prepared.core().surface_name(j);
-            let message = found.stop.message(t0, &mode, name);
-            return Err(PyValueError::new_err(message));
-        }
-        let n = x.len();
-        let (by_state, by_parameters) = found.derivative.split_at(n * n);
-        let [at_start, at_end] = &found.velocities;
-        // The motion that starts later starts farther back.
-        let back = |r: usize| {
-            (0..n)
-                .map(|c| by_state[c * n + r] * at_start[c])
-                .sum::<f64>()
-        };
-        let row = |r: usize| {
-            let entries = |columns: &[f64]| columns.iter().skip(r).step_by(n).copied().collect();
-            let (states, parameters): (Vec<f64>, Vec<f64>) =
-                (entries(by_state), entries(by_parameters));
-            [&states[..], &[at_end[r] - back(r), at_end[r]], &parameters].concat()
-        };
-        let mut derivative: Vec<Vec<f64>> = (0..n).map(row).collect();
-        if let Some(guard) = &found.ending {
-            derivative.push(along(&guard.gradient, &derivative));
-        }
-        let times: Vec<f64> = found.samples.iter().map(|sample| sample.0).collect();
-        let width = found.samples.first().map_or(0, |sample| sample.1.len());
-        let values: Vec<f64> = found
-            .samples
-            .into_iter()
-            .flat_map(|sample| sample.1)
-            .collect();
-        Ok((
-            PyArray1::from_slice(py, &found.x),
-            PyArray2::from_vec2(py, &derivative)?,
-            found.velocities.map(|v| PyArray1::from_slice(py, &v)),
-            PyArray1::from_slice(py, &times),
-            columns(py, &values, width),
-            found.ending.map(|guard| {
-                let row = by_time_and_state(&guard.gradient);
-                (guard.value, PyArray1::from_vec(py, row))
-            }),
-        ))
+        rows_of(py, found)
     }
 
     /// The guards of a motion.
@@ -234,7 +317,7 @@ impl HeldMotions {
             let multipliers = motion.multipliers();
             let found = motion.guards_at(t, &x).map_err(raised)?;
             let values: Vec<f64> = found.iter().map(|guard| guard.value).collect();
-            let rows = found.iter().map(|guard| by_time_and_state(&guard.gradient));
+            let rows = found.iter().map(|guard| guard.gradient.by_all());
             let rows: Vec<Vec<f64>> = rows.collect();
             let gradients = match rows.is_empty() {
                 true => PyArray2::zeros(py, [0, 1 + velocity.len()], false),
@@ -249,9 +332,7 @@ impl HeldMotions {
         })
     }
 
-    /// What an action makes of a place: the state and the discrete states after it, the derivative of the state by states and
-    /// parameters (or none), and by the time; and the value of the clock that it waits for, with its derivatives.
-    #[allow(clippy::type_complexity)]
+    /// The state that an action makes of a place.
     fn act<'py>(
         &self,
         py: Python<'py>,
@@ -260,40 +341,45 @@ impl HeldMotions {
         q: Vec<f64>,
         t: f64,
         x: Given<'_>,
-    ) -> PyResult<(
-        Vector<'py>,
-        Vec<f64>,
-        Option<Rows<'py>>,
-        Vector<'py>,
-        Option<(f64, Vector<'py>)>,
-    )> {
+    ) -> PyResult<Vector<'py>> {
         let (mode, x) = (Mode::new(mode), x.as_slice()?.to_vec());
         self.with(&q, |_, extended, actions| {
             let found = extended.act((actions, index), &mode, (t, &x, &q));
-            let found = found.map_err(raised)?;
-            let rows = found.rows.map(|rows| PyArray2::from_vec2(py, &rows));
-            let clock = found.clock.map(|(value, gradient)| {
-                (value, PyArray1::from_vec(py, by_time_and_state(&gradient)))
-            });
-            Ok((
-                PyArray1::from_slice(py, &found.x),
-                found.q,
-                rows.transpose()?,
-                PyArray1::from_slice(py, &found.by_time),
-                clock,
-            ))
+            Ok(PyArray1::from_vec(py, found.map_err(raised)?.x))
         })
     }
 }
 
 impl HeldMotions {
+    fn system(&self) -> PyResult<&filippov::TracedSystem> {
+        let system = self.prepared.traced().map(|system| &**system);
+        system.ok_or_else(|| PyValueError::new_err("system: it is not traced"))
+    }
+
+    /// What was found, or why it was not.
+    fn checked<R>(&self, py: Python<'_>, found: Result<R, ItineraryError>) -> PyResult<R> {
+        if let Some(raised) = PyErr::take(py) {
+            return Err(raised);
+        }
+        found.map_err(|error| match error {
+            ItineraryError::Argument(error) => refused(error),
+            ItineraryError::Raised(error) => raised(error),
+            ItineraryError::NoGuard { leg } => {
+                PyValueError::new_err(format!("the motion of piece {leg} has no such end"))
+            }
+            ItineraryError::Stopped { mode, t, stop } => {
+                let name = |j: usize| self.prepared.core().surface_name(j);
+                PyValueError::new_err(stop.message(t, &mode, name))
+            }
+        })
+    }
+
     fn with<R>(
         &self,
         q: &[f64],
-        ask: impl FnOnce(&filippov::TracedSystem, &Extended, &filippov::action::Actions) -> PyResult<R>,
+        ask: impl FnOnce(&filippov::TracedSystem, &Extended, &Actions) -> PyResult<R>,
     ) -> PyResult<R> {
-        let system = self.prepared.traced();
-        let system = system.ok_or_else(|| PyValueError::new_err("system: it is not traced"))?;
+        let system = self.system()?;
         let mut actions = self.prepared.actions();
         actions.discrete = q.to_vec();
         let extended = self.extension.at(system.parameters(), &actions);

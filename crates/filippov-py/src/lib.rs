@@ -49,7 +49,7 @@ mod _core {
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]
-    use super::itineraries::HeldMotions;
+    use super::itineraries::{HeldItinerary, HeldMotions};
     #[pymodule_export]
     use super::page::{answer_page, pack_page, page_of, PageModel};
     #[pymodule_export]

@@ -108,9 +108,10 @@ pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
-    classify, contradicts, field_off_surfaces, hidden_dynamics, intersection_field, leg,
-    message_of, not_finite, state_text, Classification, HiddenDynamics, HiddenRoot, Inspection,
-    IntersectionValue, Leg, LegError, NotFinitePlace, OffSurfaces, Over, PointKind,
+    classify, contradicts, equations, field_off_surfaces, hidden_dynamics, intersection_field,
+    message_of, not_finite, state_after, state_text, Classification, Dip, Equations, GuardRates,
+    HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, ItineraryError, ItineraryLeg, Leg,
+    LegEnd, NotFinitePlace, OffSurfaces, Passage, PointKind, Unknowns,
 };
 pub use integrate::{Integrator, Problem, Reached, ReplayError};
 pub use mode::{Mode, Signs};

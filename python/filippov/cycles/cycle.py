@@ -97,7 +97,7 @@ class Cycle:
     @cached_property
     def monodromy(self) -> Array:
         """The derivative of the state after one period by that at the start, both at fixed times, (n, n)."""
-        return self._shot.monodromy()
+        return self._shot.monodromy
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -113,7 +113,7 @@ class Cycle:
         for k, passage in enumerate(self._shot.passages):
             if self._parts.legs[k].ending is not None:
                 following = self._shot.passages[(k + 1) % len(self._shot.passages)]
-                found = max(found, n - _rank(passage.saltation(following.leg.velocities[0])))
+                found = max(found, n - _rank(passage.saltation(following.velocities[0])))
         return min(found, n)
 
     @cached_property
@@ -129,7 +129,7 @@ class Cycle:
         """By how much M f differs from f, relative to f, for a cycle without forcing; 0 for one with it."""
         if self.is_forced:
             return 0.0
-        velocity = self._shot.passages[0].leg.velocities[0]
+        velocity = self._shot.passages[0].velocities[0]
         return float(np.linalg.norm(self.monodromy @ velocity - velocity) / np.linalg.norm(velocity))
 
     @property
@@ -177,14 +177,14 @@ class Cycle:
         t = self.t0 + (t - self.t0 + rounding) % self.period - rounding
         since = self.t0
         if abs(t - since) <= rounding:
-            return self._shot.passages[-1].leg.x if before else self.y0
+            return self._shot.passages[-1].x if before else self.y0
         for k, (leg, start) in enumerate(zip(itinerary.legs, itinerary.starts, strict=True)):
             until = since + itinerary.durations[k]
             if abs(t - until) <= rounding:
                 passage = self._shot.passages[k]
-                return passage.leg.x if before else passage.after
+                return passage.x if before else passage.after
             if t < until or k + 1 == len(itinerary.legs):
-                return motions.leg(leg.mode, leg.discrete, since, start, t - since).x
+                return motions.leg(leg.mode, leg.discrete, since, start, t - since)
             since = until
         raise AssertionError  # there is a leg
 
@@ -262,7 +262,7 @@ class Cycle:
         start, shift = states[0], 0.0
         if self._section is not None:
             by_state, by_name = _slopes_of(self._section, self.t0, self.y0, self.params, name)
-            velocity = self._shot.passages[0].leg.velocities[0]
+            velocity = self._shot.passages[0].velocities[0]
             shift = -float(by_state @ start + by_name) / float(by_state @ velocity)
             start = start + shift * velocity
         ended = [i for i, leg in enumerate(self._parts.legs) if leg.ending is not None and not leg.is_cut]
@@ -303,7 +303,7 @@ def multipliers_of(shot: Shot, is_forced: bool, n_zero: int = 0) -> npt.NDArray[
     They are NaN where a leg ends without speed.
     """
     across = None if is_forced else shot.across()
-    own = shot.monodromy() if across is None else across
+    own = shot.monodromy if across is None else across
     if not np.isfinite(own).all():
         return np.full(len(own), np.nan, dtype=np.complex128)
     found = np.linalg.eigvals(own).astype(np.complex128)

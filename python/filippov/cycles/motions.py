@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import HeldMotions, Run, TracedSystem
+from filippov._core import HeldItinerary, HeldMotions, Run, TracedSystem
 from filippov.derivatives import Back, refuse_without_derivatives
 from filippov.errors import InputError, ModelError
 from filippov.options import Options, check_options
@@ -21,10 +21,12 @@ from filippov.switches import RunWarning
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Guard", "GuardsAt", "Instant", "LegEnd", "Mode", "Motions", "Record"]
+__all__ = ["Equations", "Guard", "GuardsAt", "Instant", "Mode", "Motions", "Record"]
 
 Array = npt.NDArray[np.float64]
 Mode = tuple[int, ...]
+# Residual, Jacobian, monodromy matrix, what happens to the legs, and the minima of guards.
+Equations = tuple[Array, Array, Array, tuple[Any, ...], list[tuple[int, int, int, list[float]]]]
 # Kind, surface and end of a guard, as the core names it.
 Guard = tuple[str, int, int]
 
@@ -39,38 +41,6 @@ _NOT_HERE = (
 )
 # Arguments of the functions that hand their options over: what was misspelled may be one of these.
 _OF_CALLERS = ("params", "t0", "section", "period", "itinerary", "transient", "mode", "progress")
-
-
-class LegEnd(NamedTuple):
-    """Where a motion leads in a given time.
-
-    Attributes
-    ----------
-    x : ndarray, shape (n,)
-        The state at the end.
-    derivatives : ndarray, shape (n, n + 2 + k) or (n + 1, n + 2 + k)
-        Its derivatives by the state and the time at the start, by the duration and by the parameters; in a
-        last row those of the guard asked for at the end.
-    velocities : (ndarray, ndarray)
-        The velocities at both ends.
-    times, guards : ndarray, shape (m,) and (g, m)
-        Places on the way, and the values of the guards there.
-    ending : (float, ndarray of shape (1 + n + k,)) or None
-        The guard asked for at the end, and its derivatives by the time, the state and the parameters.
-    """
-
-    x: Array
-    derivatives: Array
-    velocities: tuple[Array, Array]
-    times: Array
-    guards: Array
-    ending: tuple[float, Array] | None
-
-    @property
-    def by_state(self) -> Array:
-        """The derivative by the state at the start, (n, n)."""
-        n = len(self.x)
-        return self.derivatives[:n, :n]
 
 
 class GuardsAt(NamedTuple):
@@ -242,17 +212,8 @@ class Motions:
         other._by, other._held = tuple(names), None
         return other
 
-    def leg(
-        self,
-        mode: Mode,
-        q: tuple[float, ...],
-        t0: float,
-        x: Array,
-        duration: float,
-        places: int = 0,
-        guard: Guard | None = None,
-    ) -> LegEnd:
-        """Follow the motion in a mode for some time, at least a rounding of it, maybe to a guard.
+    def leg(self, mode: Mode, q: tuple[float, ...], t0: float, x: Array, duration: float) -> Array:
+        """Return where the motion in a mode leads in some time, at least a rounding of it.
 
         Raises
         ------
@@ -260,13 +221,31 @@ class Motions:
             If the motion cannot be followed so far.
         """
         last = max(t0 + duration, np.nextafter(t0, np.inf))
-        ending = None if guard is None else self.guards(mode, q).index(guard)
         try:
-            found = self._motions().leg(mode, q, t0, _contiguous(x), last, places, ending)
+            return self._motions().leg(mode, q, t0, _contiguous(x), last)
         except ValueError as error:
-            raise ModelError(f"in mode {mode} from t = {t0:.6g}: {error}") from None
-        end, derivatives, (at_start, at_end), times, guards, at_guard = found
-        return LegEnd(end, derivatives, (at_start, at_end), times, guards, at_guard)
+            raise ModelError(str(error)) from None
+
+    def equations(
+        self,
+        itinerary: HeldItinerary,
+        starts: Array,
+        durations: Array,
+        t0: float,
+        is_free_in_time: bool,
+        places: int,
+    ) -> Equations:
+        """Return the equations of an itinerary, with guards at some places of each step if there are any.
+
+        Raises
+        ------
+        ModelError
+            If a leg cannot be followed.
+        """
+        try:
+            return self._motions().equations(itinerary, starts, durations, t0, is_free_in_time, places)
+        except ValueError as error:
+            raise ModelError(str(error)) from None
 
     def guards(self, mode: Mode, q: tuple[float, ...]) -> list[Guard]:
         """Return what ends the motion in a mode."""
@@ -280,12 +259,9 @@ class Motions:
         own = 1 + self.n
         return GuardsAt(velocity, multipliers, values, rows[:, 0], rows[:, 1:own], rows[:, own:])
 
-    def act(
-        self, index: int, mode: Mode, q: tuple[float, ...], t: float, x: Array
-    ) -> tuple[Array, tuple[float, ...], Array | None, Array, tuple[float, Array] | None]:
-        """Return what an action makes of a place: state, discrete states, derivatives, and its clock."""
-        after, discrete, rows, by_time, clock = self._motions().act(index, mode, q, t, _contiguous(x))
-        return after, tuple(discrete), rows, by_time, clock
+    def act(self, index: int, mode: Mode, q: tuple[float, ...], t: float, x: Array) -> Array:
+        """Return the state that an action makes of a place."""
+        return self._motions().act(index, mode, q, t, _contiguous(x))
 
     def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
         """Run the system with these parameters."""

@@ -101,7 +101,7 @@ def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
     found = []
     for leg, start, duration in zip(shooting.legs, starts, durations, strict=True):
         half = 0.5 * duration
-        found.append((duration, t + half, motions.leg(leg.mode, leg.discrete, t, start, half).x))
+        found.append((duration, t + half, motions.leg(leg.mode, leg.discrete, t, start, half)))
         t += duration
     return found
 
@@ -249,7 +249,7 @@ def _with_touch(curve: CycleCurve, key: Any, w: Array) -> Iterator[Itinerary]:
         )
         after = touch.x
         for k in acts:
-            after = motions.act(k, leg.mode, leg.discrete, touch.t, after)[0]
+            after = motions.act(k, leg.mode, leg.discrete, touch.t, after)
         first = leg._replace(ending=Ending(guard, touch.t, acts))
         yield _replaced(itinerary, i, [(first, itinerary.starts[i], before), (leg, after, behind)])
         return

@@ -69,19 +69,7 @@ class Probe(NamedTuple):
 
 def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
     """Return the test functions of a cycle; `shot` holds the guards along each leg."""
-    found: list[Probe] = []
-    starts, _, t = shooting.parts(u)
-    for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
-        along = passage.leg.times, passage.leg.guards
-        if leg.ending is None or leg.is_cut:
-            # The next leg goes on with it.
-            beside = shot.passages[(i + 1) % shooting.m].leg
-            times, guards = beside.times, beside.guards
-            beyond = passage.t + times[1] - times[0]
-            along = np.append(along[0], beyond), np.hstack([along[1], guards[:, 1:2]])
-        found += _inside(shooting, i, leg, t, starts[i], along)
-        t = passage.t
-    return found + end_probes_of(shooting, shot)
+    return [*_inside(shooting, u, shot), *end_probes_of(shooting, shot)]
 
 
 def end_probes_of(shooting: Shooting, shot: Shot) -> list[Probe]:
@@ -94,28 +82,15 @@ def end_probes_of(shooting: Shooting, shot: Shot) -> list[Probe]:
     return found
 
 
-def _inside(
-    shooting: Shooting, i: int, leg: Leg, t0: float, x: Array, along: tuple[Array, Array]
-) -> list[Probe]:
-    """Return the local minima of the guards of a leg, from their values at some times."""
+def _inside(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
+    """Return the minima of the guards along the legs."""
     found = []
-    times, values = along
-    guards = shooting.motions.guards(leg.mode, leg.discrete)
-    for g, guard in enumerate(guards):
-        row = values[g]
-        if len(row) < 3:
-            continue
-        inner = (row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])
-        size = float(np.max(np.abs(row)))
-        for number, k in enumerate(np.flatnonzero(inner) + 1):
-            if abs(row[k]) > 0.5 * size:
-                continue  # far from zero, whatever the parameter does next
-            t, point, value = _minimum(
-                shooting.motions, leg, t0, x, (times[k - 1], times[k + 1]), times[k], g
-            )
-            found.append(
-                Probe(_code_inside(shooting.motions, guard), i, guard, "inside", number, t, value, point)
-            )
+    motions, (starts, durations, t0) = shooting.motions, shooting.parts(u)
+    for i, g, number, (before, t, behind) in shot.dips:
+        leg, since = shooting.legs[i], t0 + sum(durations[:i])
+        t, point, value = _minimum(motions, leg, since, starts[i], (before, behind), t, g)
+        guard = motions.guards(leg.mode, leg.discrete)[g]
+        found.append(Probe(_code_inside(motions, guard), i, guard, "inside", number, t, value, point))
     return found
 
 
@@ -126,7 +101,7 @@ def _minimum(
 
     @cache
     def there(t: float) -> tuple[Array, GuardsAt]:
-        point = motions.leg(leg.mode, leg.discrete, t0, x, t - t0).x if t > t0 else x
+        point = motions.leg(leg.mode, leg.discrete, t0, x, t - t0) if t > t0 else x
         return point, motions.at(leg.mode, leg.discrete, t, point)
 
     def rate_at(t: float) -> float:
@@ -159,20 +134,20 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
     assert leg.ending.guard is not None
     guard, t = leg.ending.guard, passage.t
     kind, surface, _ = guard
-    own = motions.at(leg.mode, leg.discrete, t, passage.leg.x)
+    (values, rates), (values_behind, rates_behind) = passage.sides or _sides(motions, leg, following, passage)
     place = motions.guards(leg.mode, leg.discrete).index(guard)
     found = []
 
     def add(code: str, about: Guard, value: float, number: int = 0) -> None:
-        found.append(Probe(code, i, about, "end", number, t, float(value), passage.leg.x))
+        found.append(Probe(code, i, about, "end", number, t, float(value), passage.x))
 
     # The motion leads through the zero of its guard.
     code = "GR" if leg.ending.acts else {"surface": "GS", "multiplier": "AS"}.get(kind, "AS")
-    rate = -float(own.rates()[place])
+    rate = -rates[place]
     # Nothing else ends it at the same place.
     for k, other in enumerate(motions.guards(leg.mode, leg.discrete)):
         if other[0] in ("surface", "multiplier") and other[:2] != guard[:2]:
-            add("CO", other, own.values[k], _CORNER)
+            add("CO", other, values[k], _CORNER)
     if kind == "multiplier" and not leg.ending.acts and following.mode[surface] != 0:
         # The field of the other side leads to the surface: else both are tangent where sliding ends.
         side = (*following.mode[:surface], -following.mode[surface], *following.mode[surface + 1 :])
@@ -185,14 +160,22 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
     add(code, guard, rate)
     if leg.ending.acts or kind != "surface":
         return found
-    behind = motions.at(following.mode, passage.discrete, t, passage.after)
     guards = motions.guards(following.mode, passage.discrete)
     for k, other in enumerate(guards):
         if other[0] == "surface" and other[1] == surface and _is_crossed(leg.mode, following.mode, surface):
-            add("CS", other, behind.rates()[k], 1)
+            add("CS", other, rates_behind[k], 1)
         elif other[0] != "surface":
-            add("SS", other, behind.values[k], 2)
+            add("SS", other, values_behind[k], 2)
     return found
+
+
+def _sides(
+    motions: Motions, leg: Leg, following: Leg, passage: Passage
+) -> list[tuple[list[float], list[float]]]:
+    """Return the values of the guards and their rates, before the end of a leg and behind it."""
+    before = motions.at(leg.mode, leg.discrete, passage.t, passage.x)
+    behind = motions.at(following.mode, passage.discrete, passage.t, passage.after)
+    return [(side.values.tolist(), side.rates().tolist()) for side in (before, behind)]
 
 
 def _is_crossed(before: Mode, after: Mode, surface: int) -> bool:
@@ -226,17 +209,17 @@ def local_probe(
         bracket = (max(t0, near - 0.2 * duration), near + 0.2 * duration)
         t, point, value = _minimum(motions, leg, t0, x, bracket, near, g)
         return value, _second(motions, leg, t, point, g, duration), (t - t0) / duration
-    passage = shooting._pass(leg, t0, x, duration, 0)
+    passage = shooting.passage(i, t0, x, duration)
     behind = shooting.legs[(i + 1) % shooting.m]._replace(discrete=passage.discrete)
     value = {probe.key: probe.value for probe in _at_end(motions, i, leg, behind, passage)}[key]
     if number == _TWO_FOLD:
         return value, np.nan, 1.0
     if number == _CORNER:
         g = motions.guards(leg.mode, leg.discrete).index(guard)
-        return value, float(motions.at(leg.mode, leg.discrete, passage.t, passage.leg.x).rates()[g]), 1.0
+        return value, float(motions.at(leg.mode, leg.discrete, passage.t, passage.x).rates()[g]), 1.0
     if number == 0:  # the motion before leads through the zero of its guard
         g = motions.guards(leg.mode, leg.discrete).index(guard)
-        return value, _second(motions, leg, passage.t, passage.leg.x, g, duration), 1.0
+        return value, _second(motions, leg, passage.t, passage.x, g, duration), 1.0
     g = motions.guards(behind.mode, behind.discrete).index(guard)
     if number == 1:  # the motion behind a crossing leads away
         return value, _second(motions, behind, passage.t, passage.after, g, duration), 1.0

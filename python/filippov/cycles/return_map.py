@@ -45,7 +45,7 @@ class ReturnMap:
         x = cycle.at(self.t0)
         self.cycle = cycle_at(self.motions, self.t0, x, self.period, cycle._shooting.period, is_free=True)
         self.point = self.cycle.y0
-        self.velocity = self.cycle._shot.passages[0].leg.velocities[0]
+        self.velocity = self.cycle._shot.passages[0].velocities[0]
         self.passages = 1
         if not self.is_forced:
             run = self.motions.run((0.0, 1.05 * self.period), self.point, events=self._event())

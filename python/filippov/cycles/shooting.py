@@ -11,13 +11,14 @@ Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from filippov._core import HeldItinerary
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
-from filippov.cycles.motions import Array, LegEnd, Motions
+from filippov.cycles.motions import Array, Equations, Motions
 from filippov.errors import ModelError
 
 __all__ = ["Passage", "Period", "Shooting", "Shot", "divided", "scales", "solve"]
@@ -43,66 +44,50 @@ class Passage(NamedTuple):
     ----------
     t : float
         The time of its end.
-    leg : LegEnd
-        The motion.
-    value, row : float, ndarray of shape (1 + n + k,)
-        The equation of its end, by the time, the state and the parameters; no row if nothing ends it.
+    x : ndarray, shape (n,)
+        The state there.
+    by_state : ndarray, shape (n, n)
+        Its derivative by the state at the start.
+    velocities : ndarray, shape (2, n)
+        The velocities at both ends.
+    row : ndarray of shape (1 + n + k,) or None
+        The derivatives of the equation of its end by the time, the state and the parameters; none if nothing
+        ends it.
     after : ndarray, shape (n,)
         The state behind the end.
     map : ndarray of shape (n, 1 + n + k) or None
         Its derivatives by the time, the state before, and the parameters; nothing if no action changes it.
     discrete : tuple of float
         The discrete states behind the end.
+    sides : list of (list, list), or None
+        Before the end and behind it the values of the guards and their rates, where they were asked for.
     """
 
     t: float
-    leg: LegEnd
-    value: float
+    x: Array
+    by_state: Array
+    velocities: Array
     row: Array | None
     after: Array
     map: Array | None
     discrete: tuple[float, ...]
-
-    def derivatives(self) -> Array:
-        """Return the derivatives of the state behind the end, and in a last row those of the equation there.
-
-        Their columns are by the state at the start, the time there, the duration, and the parameters.
-        """
-        n, known = len(self.after), self.leg.derivatives
-        if self.map is None and (self.row is None or len(known) > n):
-            return known
-        found = [known[:n] if self.map is None else self._along(self.map)]
-        if self.row is not None:
-            found.append(known[n:] if len(known) > n else self._along(self.row[None]))
-        return np.concatenate(found)
-
-    def _along(self, rows: Array) -> Array:
-        """Return derivatives of what is a function of the end, by the columns of the leg."""
-        n = len(self.after)
-        found = rows[:, 1 : 1 + n] @ self.leg.derivatives[:n]
-        found[:, n : n + 2] += rows[:, :1]
-        found[:, n + 2 :] += rows[:, 1 + n :]
-        return np.asarray(found)
-
-    def across(self, states: Array, time: Array) -> Array:
-        """Return changes of the state behind the end from those before, and from those of its time."""
-        moved = states + np.outer(self.leg.velocities[1], time)
-        if self.map is None:
-            return np.asarray(moved)
-        return np.asarray(self.map[:, 1 : 1 + len(self.after)] @ moved + np.outer(self.map[:, 0], time))
+    sides: list[tuple[list[float], list[float]]] | None
 
     def saltation(self, following: Array) -> Array:
         """Return the derivative of the state behind the end by that before, from the velocity behind."""
         n = len(self.after)
         if self.row is None:
             return np.eye(n)
-        at_end, normal = self.leg.velocities[1], self.row[1 : 1 + n]
+        at_end, normal = self.velocities[1], self.row[1 : 1 + n]
         with np.errstate(divide="ignore", invalid="ignore"):
             time = -normal / (self.row[0] + normal @ at_end)
-            return self.across(np.eye(n), time) - np.outer(following, time)
+            moved = np.eye(n) + np.outer(at_end, time)
+            if self.map is not None:
+                moved = self.map[:, 1 : 1 + n] @ moved + np.outer(self.map[:, 0], time)
+            return np.asarray(moved - np.outer(following, time))
 
 
-class Shot(NamedTuple):
+class Shot:
     """The equations at a point.
 
     Attributes
@@ -110,33 +95,46 @@ class Shot(NamedTuple):
     residual : ndarray, shape (N,)
     jacobian : ndarray, shape (N, N + k)
         Its derivatives by the unknowns, then by the parameters.
-    passages : list of Passage
+    monodromy : ndarray, shape (n, n)
+        The derivative of the state after one period by the state at the start, at fixed times. It is infinite
+        where a leg ends without speed.
+    dips : list of (int, int, int, (float, float, float))
+        Minima of guards near zero, if they were asked for: the leg, the guard, which minimum of it, and the
+        times before it, of it and behind it.
     """
 
-    residual: Array
-    jacobian: Array
-    passages: list[Passage]
+    def __init__(self, found: Equations) -> None:
+        self.residual, self.jacobian, self.monodromy, self._rows, self.dips = found
 
-    def monodromy(self) -> Array:
-        """Return the derivative of the state after one period by the state at the start, at fixed times.
+    @cached_property
+    def passages(self) -> list[Passage]:
+        """The legs, with what happens at their ends."""
+        times, ends, columns, velocities, rows, after, maps, discrete, sides = self._rows
+        return [
+            Passage(
+                t,
+                ends[i],
+                columns[i].T,
+                velocities[i],
+                None if np.isnan(rows[i, 0]) else rows[i],
+                after[i],
+                maps[i],
+                tuple(discrete[i]),
+                sides[i],
+            )
+            for i, t in enumerate(times)
+        ]
 
-        It is infinite where a leg ends without speed.
-        """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self._monodromy()
+    @property
+    def growths(self) -> Array:
+        """How much small changes of the state may grow along each leg, at most."""
+        columns = self._rows[2]
+        return np.asarray(np.sqrt(np.einsum("ijk,ijk->i", columns, columns)))
 
-    def _monodromy(self) -> Array:
-        n = len(self.passages[0].after)
-        states, time = np.eye(n), np.zeros(n)
-        for passage in self.passages:
-            at_start, at_end = passage.leg.velocities
-            states = passage.leg.by_state @ (states - np.outer(at_start, time))  # at a fixed time
-            if passage.row is None:
-                return np.asarray(states)
-            rate = passage.row[0] + passage.row[1 : 1 + n] @ at_end
-            time = -(passage.row[1 : 1 + n] @ states) / rate
-            states = passage.across(states, time)
-        return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
+    @property
+    def fastest(self) -> float:
+        """The largest velocity at the ends of the legs."""
+        return float(np.max(np.abs(self._rows[3])))
 
     def across(self) -> Array | None:
         """Return the monodromy matrix across the motion, (n - 1, n - 1); nothing where the motion rests.
@@ -144,14 +142,14 @@ class Shot(NamedTuple):
         The direction of the motion is mapped to itself. Without it the product keeps the digits of the other
         multipliers, however large they are beside 1.
         """
-        starts = [passage.leg.velocities[0] for passage in self.passages]
-        if not all(np.isfinite(f).all() and np.any(f) for f in starts):
+        starts = self._rows[3][:, 0]
+        if not (np.isfinite(starts).all() and np.any(starts, axis=1).all()):
             return None
         normals = [np.linalg.svd(f[None, :])[2][1:].T for f in starts]
         found = np.eye(len(starts[0]) - 1)
         for i, passage in enumerate(self.passages):
             k = (i + 1) % len(starts)
-            step = passage.saltation(starts[k]) @ passage.leg.by_state
+            step = passage.saltation(starts[k]) @ passage.by_state
             with np.errstate(invalid="ignore", over="ignore"):
                 found = normals[k].T @ step @ normals[i] @ found
         return found if np.isfinite(found).all() else None
@@ -180,7 +178,6 @@ class Shooting:
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
         self._guess = itinerary
-        self._unit = np.eye(self.n)
         # The parts of a divided motion keep their shares of it.
         durations = itinerary.durations
         self._shares = [
@@ -192,7 +189,7 @@ class Shooting:
         """The largest change of each state from the start to the middle of a leg in the guess, (n,)."""
         t, found = self._guess.t0, np.zeros(self.n)
         for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
-            middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration).x
+            middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration)
             found = np.maximum(found, np.abs(middle - x))
             t += duration
         return np.where(np.isfinite(found), found, 0.0)
@@ -243,75 +240,52 @@ class Shooting:
             If a leg cannot be followed.
         """
         n, m, size = self.n, self.m, self.size
-        starts, durations, t = self.parts(u)
-        residual, jacobian = np.zeros(size), np.zeros((size, size + len(self.motions.by)))
-        passages = []
-        for i, leg in enumerate(self.legs):
-            if durations[i] < -_NOTHING * sum(durations):
-                raise ModelError(f"the duration of piece {i} of the itinerary is {durations[i]:.3g}")
-            passage = self._pass(leg, t, starts[i], durations[i], places)
-            passages.append(passage)
-            t = passage.t
-            # The state at the start of the next leg, then what ends this one.
-            first, last, duration = i * (n + 1), i * (n + 1) + n, m * n + i
-            following = (i + 1) % m
-            residual[first:last] = passage.after - starts[following]
-            residual[last] = passage.value
-            found = passage.derivatives()
-            own = jacobian[first : first + len(found)]
-            own[:, i * n : (i + 1) * n] = found[:, :n]
-            own[:, m * n : duration] = found[:, n : n + 1]
-            own[:, duration] = found[:, n + 1]
-            own[:, m * (n + 1) : size] = found[:, n : n + 1]
-            own[:, size:] = found[:, n + 2 :]
-            own[:n, following * n : (following + 1) * n] -= self._unit
-            if leg.is_cut:
-                jacobian[last] = 0.0
-                residual[last] = durations[i] - self._shares[i] * durations[i + 1]
-                jacobian[last, duration], jacobian[last, duration + 1] = 1.0, -self._shares[i]
+        starts, durations, t0 = self.parts(u)
+        shortest = -_NOTHING * sum(durations)
+        for i, duration in enumerate(durations):
+            if duration < shortest:
+                raise ModelError(f"the duration of piece {i} of the itinerary is {duration:.3g}")
+        own = u[: m * n], u[m * n : m * (n + 1)]
+        found = self.motions.equations(self._held, *own, t0, self.is_free_in_time, places)
+        residual, jacobian = found[:2]
         if self.period is not None:
             residual[-1] = sum(durations) - self.period.value(self.motions)
+            jacobian[-1] = 0.0
             jacobian[-1, m * n : m * (n + 1)] = 1.0
             if self.motions.by:
                 jacobian[-1, size:] = -self.period.slopes(self.motions)
         elif self.legs[-1].ending is None:
             residual[-1] = self._along @ (starts[0] - self._reference)
+            jacobian[-1] = 0.0
             jacobian[-1, :n] = self._along
-        return Shot(residual, jacobian, passages)
+        return Shot(found)
 
-    def _pass(self, leg: Leg, t0: float, x: Array, duration: float, places: int) -> Passage:
-        """Follow a leg, and do what happens at its end."""
-        n, k = self.n, len(self.motions.by)
-        guard = None if leg.ending is None else leg.ending.guard
-        found = self.motions.leg(leg.mode, leg.discrete, t0, x, duration, places, guard)
-        t = t0 + duration
-        if leg.ending is None:
-            return Passage(t, found, 0.0, None, found.x, None, leg.discrete)
-        value, row = found.ending or self._at_time(leg, leg.ending, t, found.x)
-        after, discrete, derivative = found.x, leg.discrete, None
-        for index in leg.ending.acts:
-            after, discrete, rows, by_time, _ = self.motions.act(index, leg.mode, discrete, t, after)
-            if rows is not None:
-                derivative = np.eye(n, 1 + n + k, 1) if derivative is None else derivative
-                derivative = rows[:, :n] @ derivative
-                derivative[:, 0] += by_time
-                derivative[:, 1 + n :] += rows[:, n:]
-        return Passage(t, found, value, row, after, derivative, discrete)
+    def passage(self, i: int, t0: float, x: Array, duration: float) -> Passage:
+        """Return one of its legs alone, from another place.
 
-    def _at_time(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
-        """Return the equation of an end at a known time, and its derivatives by time, state, parameters."""
-        n, k = self.n, len(self.motions.by)
-        if ending.cuts:
-            return 0.0, np.eye(1, 1 + n + k)[0]
-        for index in ending.acts:
-            clock = self.motions.act(index, leg.mode, leg.discrete, t, x)[4]
-            if clock is not None:
-                value, row = clock
-                nearest = round(value)  # the count at which it ticks
-                return value - nearest, row
-        row = np.zeros(1 + n + k)
-        row[0] = 1.0
-        return t - ending.time, row
+        Raises
+        ------
+        ModelError
+            If it cannot be followed.
+        """
+        leg = HeldItinerary([self._rows[i]])
+        return Shot(self.motions.equations(leg, x, np.array([duration]), t0, False, 0)).passages[0]
+
+    @cached_property
+    def _held(self) -> HeldItinerary:
+        return HeldItinerary(self._rows)
+
+    @property
+    def _rows(self) -> list[Any]:
+        """The legs as the core takes them."""
+        rows: list[Any] = []
+        for leg, share in zip(self.legs, self._shares, strict=True):
+            end = leg.ending or Ending(None, np.nan)
+            rows.append((leg.mode, leg.discrete, end.guard, end.acts, share, end.time))
+        return rows
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_held"}
 
 
 def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] | None:
@@ -319,10 +293,10 @@ def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] 
 
     In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
     """
-    itinerary, motions = shooting.itinerary(u), shooting.motions
-    growths = [float(np.linalg.norm(passage.leg.by_state)) for passage in shot.passages]
+    growths = shot.growths.tolist()
     if not np.isfinite(growths).all() or max(growths) < _GROWTH:
         return None
+    itinerary, motions = shooting.itinerary(u), shooting.motions
     legs: list[Leg] = []
     starts: list[Array] = []
     durations: list[float] = []
@@ -333,7 +307,7 @@ def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] 
         count = 1 if growth < _GROWTH else int(np.ceil(np.log(growth) / np.log(_GROWTH_OF_PARTS)))
         part = duration / count
         for k in range(count):
-            starts.append(motions.leg(leg.mode, leg.discrete, t, x, k * part).x if k else x)
+            starts.append(motions.leg(leg.mode, leg.discrete, t, x, k * part) if k else x)
             end = Ending(None, t + (k + 1) * part, (), cuts=True)
             legs.append(leg if k + 1 == count else leg._replace(ending=end))
             durations.append(part)
@@ -372,7 +346,7 @@ def solve(
     at_first = 0.0
     for step in range(most):
         shot = shooting.shoot(u)
-        at_first = at_first or _fastest(shot)
+        at_first = at_first or shot.fastest
         jacobian, scale = shot.jacobian[:, : shooting.size], scales(shooting, u)
         change, is_singular = _newton_step(jacobian, shot.residual, scale)
         size = float(np.max(np.abs(change) / scale))
@@ -388,7 +362,7 @@ def solve(
             if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
                 break
             found = shooting.shoot(u)
-            if _fastest(found) < _SHRUNK * at_first:
+            if found.fastest < _SHRUNK * at_first:
                 raise ModelError("Newton's method leads to an equilibrium, and to no cycle")
             return u, found, size
         best = min(best, size)
@@ -398,12 +372,6 @@ def solve(
         f"Newton's method does not converge to a cycle with this itinerary: its steps do not become shorter "
         f"than {best:.2g} of the size of the cycle"
     )
-
-
-def _fastest(shot: Shot) -> float:
-    """Return the largest velocity at the ends of the legs."""
-    velocities = [passage.leg.velocities for passage in shot.passages]
-    return max(float(np.max(np.abs(v))) for pair in velocities for v in pair)
 
 
 def _newton_step(jacobian: Array, residual: Array, scale: Array) -> tuple[Array, bool]:

@@ -69,6 +69,11 @@ impl<'a> HeldMotion<'a> {
         }
     }
 
+    /// Its mode.
+    pub fn mode(&self) -> &Mode {
+        &self.piece.mode
+    }
+
     /// What ends the motion.
     pub fn guards(&self) -> &[Guard] {
         &self.guards

@@ -1,13 +1,15 @@
 //! A motion that is held in one mode over a given time, whatever its guards are: a leg of an itinerary.
 
+use super::itinerary::ItineraryError;
 use crate::derivative::{Column, Extended, GuardAt, HeldMotion, Tangents};
-use crate::error::{Error, FieldError};
+use crate::error::FieldError;
 use crate::integrate::{Problem, Reached};
 use crate::mode::Mode;
 use crate::options::{Keep, Options};
-use crate::record::Side;
+use crate::record::{Side, Solution};
 use crate::status::Stop;
 use crate::system::{Actions, TracedSystem};
+use crate::vectors::dot;
 
 /// Over what time a leg goes, from where, and what of its guards is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -35,18 +37,48 @@ pub struct Leg {
     pub samples: Vec<(f64, Vec<f64>)>,
     /// The guard that the leg ends at, there.
     pub ending: Option<GuardAt>,
-    /// Why it ended.
-    pub stop: Stop,
+}
+
+impl Leg {
+    /// The derivative of the state at the end by that at the start, a column after the other.
+    pub fn by_state(&self) -> &[f64] {
+        let n = self.x.len();
+        &self.derivative[..n * n]
+    }
+
+    /// The derivatives of the state at the end, a row for each component: by the states and the time at the start, the duration and
+    /// the parameters.
+    pub fn rows(&self) -> Vec<Vec<f64>> {
+        let n = self.x.len();
+        let [at_start, at_end] = &self.velocities;
+        let (by_state, by_parameters) = self.derivative.split_at(n * n);
+        let row = |r: usize| {
+            let entries = |columns: &[f64]| -> Vec<f64> {
+                columns.iter().skip(r).step_by(n).copied().collect()
+            };
+            let states = entries(by_state);
+            // The motion that starts later starts farther back.
+            let back = dot(&states, at_start);
+            [
+                &states[..],
+                &[at_end[r] - back, at_end[r]],
+                &entries(by_parameters),
+            ]
+            .concat()
+        };
+        (0..n).map(row).collect()
+    }
 }
 
 /// Follows the motion in a mode over a given time; `interrupt` is asked every few steps, and the leg ends where it returns `true`.
+/// The actions have the discrete states of the motion.
 ///
 /// # Errors
 /// If an argument is out of range, or a function of the user raises.
 pub fn leg(
     (system, extended, actions): (&TracedSystem, &Extended, &Actions),
     options: &Options,
-    (mode, q): (&Mode, &[f64]),
+    motion: &mut HeldMotion,
     Over {
         span,
         start,
@@ -54,7 +86,7 @@ pub fn leg(
         ending,
     }: Over,
     interrupt: &mut dyn FnMut(Reached) -> bool,
-) -> Result<Leg, LegError> {
+) -> Result<Leg, ItineraryError> {
     let n = start.len();
     let impacts = extended.impacts();
     let parameters = 0..extended.n_parameters();
@@ -71,15 +103,15 @@ pub fn leg(
     let solution = Problem::new(system, span, start)
         .options(&options)
         .actions(actions)
-        .held_in(mode)
+        .held_in(motion.mode())
         .solve_observed(&mut tangents, interrupt)?;
+    let solution = complete(solution, motion.mode())?;
     let values = tangents.finish()?.values;
     // Behind the states are the named discrete states, which rest.
     let rows = extended.n_rows();
     let last = values.len() - rows * (n + extended.n_parameters());
     let columns = values[last..].chunks_exact(rows);
     let derivative: Vec<f64> = columns.flat_map(|column| &column[..n]).copied().collect();
-    let mut motion = HeldMotion::new((system, extended), &impacts, &options, mode, q);
     let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut all = motion.velocity(t, x)?;
         all.truncate(n);
@@ -109,27 +141,40 @@ pub fn leg(
         derivative,
         samples,
         ending,
-        stop: solution.stop,
     })
 }
 
-/// Why there is no leg.
-#[derive(Debug)]
-pub enum LegError {
-    /// An argument is out of range.
-    Argument(Error),
-    /// A function of the user raised.
-    Raised(FieldError),
+/// The state to which the motion in a mode leads from a place in a given time. The actions have its discrete states.
+///
+/// # Errors
+/// If it cannot be followed so far, an argument is out of range, or a function of the user raises.
+pub fn state_after(
+    (system, actions): (&TracedSystem, &Actions),
+    options: &Options,
+    mode: &Mode,
+    (span, start): ((f64, f64), &[f64]),
+    interrupt: &mut dyn FnMut(Reached) -> bool,
+) -> Result<Vec<f64>, ItineraryError> {
+    let options = Options {
+        keep: Keep::Last,
+        dense_output: false,
+        ..options.clone()
+    };
+    let problem = Problem::new(system, span, start)
+        .options(&options)
+        .actions(actions);
+    let solution = problem.held_in(mode).solve_interruptible(interrupt)?;
+    Ok(complete(solution, mode)?.last_state().to_vec())
 }
 
-impl From<Error> for LegError {
-    fn from(error: Error) -> Self {
-        LegError::Argument(error)
-    }
-}
-
-impl From<FieldError> for LegError {
-    fn from(error: FieldError) -> Self {
-        LegError::Raised(error)
+/// A solution that comes to its end.
+fn complete(solution: Solution, mode: &Mode) -> Result<Solution, ItineraryError> {
+    match solution.stop {
+        Stop::End => Ok(solution),
+        stop => Err(ItineraryError::Stopped {
+            mode: mode.clone(),
+            t: solution.t_last,
+            stop,
+        }),
     }
 }

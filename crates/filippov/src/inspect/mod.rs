@@ -4,6 +4,7 @@
 
 mod classify;
 mod hidden_dynamics;
+mod itinerary;
 mod leg;
 mod message;
 mod mode_field;
@@ -12,7 +13,10 @@ mod off_surfaces;
 
 pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
-pub use leg::{leg, Leg, LegError, Over};
+pub use itinerary::{
+    equations, Dip, Equations, GuardRates, ItineraryError, ItineraryLeg, LegEnd, Passage, Unknowns,
+};
+pub use leg::{state_after, Leg};
 pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};

@@ -63,6 +63,13 @@ pub struct Gradient {
     pub state: Vec<f64>,
 }
 
+impl Gradient {
+    /// The derivative by time, and behind it those by the states.
+    pub fn by_all(&self) -> Vec<f64> {
+        [&[self.time], &self.state[..]].concat()
+    }
+}
+
 /// An instant in which a motion ends and another one starts. Pairs are before and after.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]

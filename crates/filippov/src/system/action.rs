@@ -118,6 +118,7 @@ fn impulse_by_differences<M: ActionMap + ?Sized>(
 }
 
 /// Something that happens in an instant.
+#[derive(Clone)]
 pub struct Action<'a> {
     /// When.
     pub trigger: Trigger,

@@ -1,0 +1,459 @@
+//! The equations of an itinerary: legs that follow one another, what happens at their ends, and that they close.
+//!
+//! The unknowns are the states at the starts of the legs, then how long they last, and maybe the time at which the first one starts.
+//! Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems).
+
+use super::leg::{leg, Leg, Over};
+use crate::derivative::{ActionAt, Extended, HeldMotion};
+use crate::error::{Error, FieldError};
+use crate::integrate::Reached;
+use crate::mode::Mode;
+use crate::motion::Guard;
+use crate::options::Options;
+use crate::record::Gradient;
+use crate::status::Stop;
+use crate::system::{Actions, TracedSystem};
+use crate::vectors::dot;
+
+/// A leg of an itinerary.
+#[derive(Clone, Debug)]
+pub struct ItineraryLeg {
+    /// Its mode.
+    pub mode: Mode,
+    /// The discrete states.
+    pub q: Vec<f64>,
+    /// What ends it.
+    pub end: LegEnd,
+    /// The actions that are done there.
+    pub acts: Vec<usize>,
+}
+
+/// What ends a leg.
+#[derive(Clone, Copy, Debug)]
+pub enum LegEnd {
+    /// The period is over, and nothing happens.
+    Open,
+    /// The next leg goes on with the motion; this one lasts so many times as long as that.
+    Cut(f64),
+    /// A guard vanishes.
+    Guard(Guard),
+    /// A known time comes.
+    Time(f64),
+}
+
+/// A leg with what happens at its end.
+#[derive(Debug)]
+pub struct Passage {
+    /// The time of its end.
+    pub t: f64,
+    /// The motion.
+    pub leg: Leg,
+    /// The equation of its end: a value that vanishes there.
+    pub value: f64,
+    /// Its derivatives by the time, the states and the parameters; none if nothing ends the leg.
+    pub row: Option<Vec<f64>>,
+    /// The state behind the end.
+    pub after: Vec<f64>,
+    /// Its derivatives by the time, the state before and the parameters; none if no action changes it.
+    pub map: Option<Vec<Vec<f64>>>,
+    /// The discrete states behind the end.
+    pub q: Vec<f64>,
+    /// The guards and their rates before the end and behind it, if they are asked for and a guard ends the leg.
+    pub sides: Option<[GuardRates; 2]>,
+}
+
+/// The values of the guards of a motion, and their derivatives along it.
+pub type GuardRates = (Vec<f64>, Vec<f64>);
+
+/// A place at which a guard of a leg is less than beside it.
+#[derive(Clone, Copy, Debug)]
+pub struct Dip {
+    /// The leg.
+    pub leg: usize,
+    /// The number of its guard.
+    pub guard: usize,
+    /// Which minimum of the guard this is.
+    pub number: usize,
+    /// The times before it, of it, and behind it.
+    pub times: [f64; 3],
+}
+
+/// The equations at a point.
+#[derive(Debug)]
+pub struct Equations {
+    /// For each leg by how much its end is not the start of the next one, and the equation of its end.
+    pub residual: Vec<f64>,
+    /// Its derivatives, a row for each entry: by the unknowns, then by the parameters.
+    pub jacobian: Vec<f64>,
+    /// The legs.
+    pub passages: Vec<Passage>,
+    /// The derivative of the state after all legs by that at the start, both at fixed times, a row after the other.
+    pub monodromy: Vec<f64>,
+    /// Where guards may touch zero on the way, if their places are asked for.
+    pub dips: Vec<Dip>,
+}
+
+/// Where the legs start and how long they last.
+#[derive(Clone, Copy, Debug)]
+pub struct Unknowns<'s> {
+    /// The state at the start of each, one after the other.
+    pub starts: &'s [f64],
+    /// How long each lasts.
+    pub durations: &'s [f64],
+    /// When the first one starts.
+    pub t0: f64,
+    /// Is that unknown too?
+    pub is_free_in_time: bool,
+    /// At how many places in each step all guards are evaluated.
+    pub places: usize,
+}
+
+/// Why there are no equations, or no state behind a motion.
+#[derive(Debug)]
+pub enum ItineraryError {
+    /// A motion cannot be followed for so long.
+    Stopped {
+        /// Its mode.
+        mode: Mode,
+        /// The last time.
+        t: f64,
+        /// Why.
+        stop: Stop,
+    },
+    /// The motion of a leg has no such guard.
+    NoGuard {
+        /// Its number.
+        leg: usize,
+    },
+    /// An argument is out of range.
+    Argument(Error),
+    /// A function of the user raised.
+    Raised(FieldError),
+}
+
+impl From<Error> for ItineraryError {
+    fn from(error: Error) -> Self {
+        ItineraryError::Argument(error)
+    }
+}
+
+impl From<FieldError> for ItineraryError {
+    fn from(error: FieldError) -> Self {
+        ItineraryError::Raised(error)
+    }
+}
+
+/// Follows the legs of an itinerary, and returns its equations; `interrupt` is asked every few steps of each leg.
+///
+/// # Errors
+/// If a leg cannot be followed, or a function of the user raises.
+pub fn equations(
+    (system, extended, actions): (&TracedSystem, &Extended, &Actions),
+    options: &Options,
+    legs: &[ItineraryLeg],
+    at: Unknowns,
+    interrupt: &mut dyn FnMut(Reached) -> bool,
+) -> Result<Equations, ItineraryError> {
+    let impacts = extended.impacts();
+    let motion = |leg: &ItineraryLeg, q: &[f64]| {
+        HeldMotion::new((system, extended), &impacts, options, &leg.mode, q)
+    };
+    let mut motions: Vec<HeldMotion> = legs.iter().map(|leg| motion(leg, &leg.q)).collect();
+    let n = at.starts.len() / legs.len();
+    let mut t = at.t0;
+    let mut passages = Vec::with_capacity(legs.len());
+    for (i, (start, &duration)) in at.starts.chunks_exact(n).zip(at.durations).enumerate() {
+        let over = Over {
+            span: (t, (t + duration).max(t.next_up())),
+            start,
+            places: at.places,
+            ending: None,
+        };
+        let held = Actions {
+            list: actions.list.clone(),
+            discrete: legs[i].q.clone(),
+        };
+        let of = (system, extended, &held);
+        let mut passage = pass(
+            of,
+            options,
+            (i, &legs[i], &mut motions[i]),
+            over,
+            t + duration,
+            interrupt,
+        )?;
+        if at.places > 0 && matches!(legs[i].end, LegEnd::Guard(_)) {
+            let next = (i + 1) % legs.len();
+            let before = rates(&mut motions[i], passage.t, &passage.leg.x)?;
+            let behind = match passage.q == legs[next].q {
+                true => rates(&mut motions[next], passage.t, &passage.after)?,
+                false => rates(
+                    &mut motion(&legs[next], &passage.q),
+                    passage.t,
+                    &passage.after,
+                )?,
+            };
+            passage.sides = Some([before, behind]);
+        }
+        t = passage.t;
+        passages.push(passage);
+    }
+    let (residual, jacobian) = assemble(legs, at, &passages, extended.n_parameters());
+    Ok(Equations {
+        residual,
+        jacobian,
+        monodromy: monodromy(&passages),
+        dips: (0..legs.len())
+            .flat_map(|i| dips(legs, &passages, i))
+            .collect(),
+        passages,
+    })
+}
+
+/// Follows a leg, and does what happens at its end.
+fn pass(
+    of: (&TracedSystem, &Extended, &Actions),
+    options: &Options,
+    (i, own, motion): (usize, &ItineraryLeg, &mut HeldMotion),
+    mut over: Over,
+    t: f64,
+    interrupt: &mut dyn FnMut(Reached) -> bool,
+) -> Result<Passage, ItineraryError> {
+    let (_, extended, actions) = of;
+    if let LegEnd::Guard(guard) = own.end {
+        let place = motion.guards().iter().position(|known| *known == guard);
+        over.ending = Some(place.ok_or(ItineraryError::NoGuard { leg: i })?);
+    }
+    let found = leg(of, options, motion, over, interrupt)?;
+    let act = |index: usize, x: &[f64], q: &[f64]| -> Result<ActionAt, FieldError> {
+        extended.act((actions, index), &own.mode, (t, x, q))
+    };
+    let (value, row) = match (own.end, &found.ending) {
+        (LegEnd::Open, _) => (0.0, None),
+        (LegEnd::Guard(_), Some(guard)) => (guard.value, Some(guard.gradient.by_all())),
+        (end, _) => {
+            let mut clock = None;
+            for &index in &own.acts {
+                clock = clock.or(act(index, &found.x, &own.q)?.clock);
+            }
+            let mut unit = vec![0.0; 1 + over.start.len() + extended.n_parameters()];
+            unit[0] = 1.0;
+            match (clock, end) {
+                // It ticks where this comes to a whole number.
+                (Some((value, gradient)), _) => {
+                    (value - value.round_ties_even(), Some(gradient.by_all()))
+                }
+                (None, LegEnd::Time(known)) => (t - known, Some(unit)),
+                (None, _) => (0.0, Some(unit)),
+            }
+        }
+    };
+    let (mut after, mut q, mut map) = (found.x.clone(), own.q.clone(), None);
+    for &index in &own.acts {
+        let done = act(index, &after, &q)?;
+        if let Some(rows) = &done.rows {
+            map = Some(chained(rows, &done.by_time, map));
+        }
+        (after, q) = (done.x, done.q);
+    }
+    Ok(Passage {
+        t,
+        leg: found,
+        value,
+        row,
+        after,
+        map,
+        q,
+        sides: None,
+    })
+}
+
+/// The guards of a motion at a place, and their derivatives along it.
+fn rates(motion: &mut HeldMotion, t: f64, x: &[f64]) -> Result<GuardRates, FieldError> {
+    let mut velocity = motion.velocity(t, x)?;
+    velocity.truncate(x.len());
+    let found = motion.guards_at(t, x)?.into_iter();
+    let rate = |gradient: &Gradient| gradient.time + dot(&gradient.state, &velocity);
+    Ok(found
+        .map(|guard| (guard.value, rate(&guard.gradient)))
+        .unzip())
+}
+
+/// The derivatives of what an action makes of a state, by the time, the state before all actions and the parameters.
+fn chained(rows: &[Vec<f64>], by_time: &[f64], before: Option<Vec<Vec<f64>>>) -> Vec<Vec<f64>> {
+    let n = by_time.len();
+    let all = rows.iter().zip(by_time);
+    all.map(|(row, by_time)| {
+        let (by_state, by_parameters) = row.split_at(n);
+        let mut found = match &before {
+            None => [&[0.0], by_state, &vec![0.0; by_parameters.len()]].concat(),
+            Some(before) => combined(by_state, before),
+        };
+        found[0] += by_time;
+        let own = found[1 + n..].iter_mut().zip(by_parameters);
+        own.for_each(|(entry, own)| *entry += own);
+        found
+    })
+    .collect()
+}
+
+/// The sum of rows with these weights.
+fn combined(weights: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut sum = vec![0.0; rows[0].len()];
+    for (weight, row) in weights.iter().zip(rows) {
+        let entries = sum.iter_mut().zip(row);
+        entries.for_each(|(entry, other)| *entry += weight * other);
+    }
+    sum
+}
+
+/// The derivatives of a function of the end of a motion, by the states and the time at its start, its duration and the parameters.
+///
+/// # Arguments
+/// * `row` - the derivatives of the function by the time, the states and the parameters
+/// * `end` - those of the states at the end
+pub fn along(row: &[f64], end: &[Vec<f64>]) -> Vec<f64> {
+    let n = end.len();
+    let mut found = combined(&row[1..=n], end);
+    let own = [row[0], row[0]]
+        .into_iter()
+        .chain(row[1 + n..].iter().copied());
+    let entries = found[n..].iter_mut().zip(own);
+    entries.for_each(|(entry, own)| *entry += own);
+    found
+}
+
+/// The equations of all legs and their derivatives, without those of the period and of the phase.
+fn assemble(
+    legs: &[ItineraryLeg],
+    at: Unknowns,
+    passages: &[Passage],
+    n_parameters: usize,
+) -> (Vec<f64>, Vec<f64>) {
+    let (m, n) = (legs.len(), at.starts.len() / legs.len());
+    let size = m * (n + 1) + usize::from(at.is_free_in_time);
+    let width = size + n_parameters;
+    let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * width]);
+    for (i, passage) in passages.iter().enumerate() {
+        let next = (i + 1) % m;
+        let (first, last, duration) = (i * (n + 1), i * (n + 1) + n, m * n + i);
+        for r in 0..n {
+            residual[first + r] = passage.after[r] - at.starts[next * n + r];
+        }
+        residual[last] = passage.value;
+        let end = passage.leg.rows();
+        let behind = passage.map.as_ref();
+        let behind = behind.map(|map| map.iter().map(|row| along(row, &end)).collect());
+        let ending = passage.row.as_ref().map(|row| along(row, &end));
+        for (r, row) in behind.unwrap_or(end).iter().chain(&ending).enumerate() {
+            let own = &mut jacobian[(first + r) * width..][..width];
+            own[i * n..(i + 1) * n].copy_from_slice(&row[..n]);
+            own[m * n..duration].fill(row[n]);
+            own[duration] = row[n + 1];
+            own[m * (n + 1)..size].fill(row[n]);
+            own[size..].copy_from_slice(&row[n + 2..]);
+            if r < n {
+                own[next * n + r] -= 1.0;
+            }
+        }
+        if let LegEnd::Cut(share) = legs[i].end {
+            residual[last] = at.durations[i] - share * at.durations[i + 1];
+            let own = &mut jacobian[last * width..][..width];
+            own.fill(0.0);
+            (own[duration], own[duration + 1]) = (1.0, -share);
+        }
+    }
+    (residual, jacobian)
+}
+
+/// The derivative of the state after all legs by that at the start, both at fixed times. It is infinite where a leg ends without speed.
+fn monodromy(passages: &[Passage]) -> Vec<f64> {
+    let n = passages[0].after.len();
+    // Changes of the state for each change at the start, and of the time at which a leg starts.
+    let mut states: Vec<Vec<f64>> = (0..n)
+        .map(|c| (0..n).map(|r| f64::from(u8::from(r == c))).collect())
+        .collect();
+    let mut times = vec![0.0; n];
+    for passage in passages {
+        let [at_start, at_end] = &passage.leg.velocities;
+        let by_state = passage.leg.by_state();
+        for (state, time) in states.iter_mut().zip(&mut times) {
+            // At a fixed time.
+            let start: Vec<f64> = state
+                .iter()
+                .zip(at_start)
+                .map(|(x, v)| x - v * *time)
+                .collect();
+            let end = by_state.chunks_exact(n).zip(&start);
+            state.fill(0.0);
+            for (column, start) in end {
+                let entries = state.iter_mut().zip(column);
+                entries.for_each(|(entry, by)| *entry += by * start);
+            }
+            let Some(row) = &passage.row else { continue };
+            let normal = &row[1..=n];
+            *time = -dot(normal, state) / (row[0] + dot(normal, at_end));
+            let entries = state.iter_mut().zip(at_end);
+            entries.for_each(|(entry, v)| *entry += v * *time);
+            if let Some(map) = &passage.map {
+                *state = map
+                    .iter()
+                    .map(|row| dot(&row[1..=n], state) + row[0] * *time)
+                    .collect();
+            }
+        }
+        if passage.row.is_none() {
+            times.fill(0.0);
+        }
+    }
+    let first = &passages[0].leg.velocities[0];
+    for (state, time) in states.iter_mut().zip(&times) {
+        let entries = state.iter_mut().zip(first);
+        entries.for_each(|(entry, v)| *entry -= v * time);
+    }
+    (0..n)
+        .flat_map(|r| states.iter().map(move |state| state[r]))
+        .collect()
+}
+
+/// Where the guards of a leg have minima near zero, by their values at some places.
+fn dips(legs: &[ItineraryLeg], passages: &[Passage], i: usize) -> Vec<Dip> {
+    let passage = &passages[i];
+    let mut samples: Vec<(f64, &[f64])> = Vec::new();
+    samples.extend(
+        passage
+            .leg
+            .samples
+            .iter()
+            .map(|(t, values)| (*t, &values[..])),
+    );
+    if matches!(legs[i].end, LegEnd::Open | LegEnd::Cut(_)) {
+        // The next leg goes on with it.
+        let beside = &passages[(i + 1) % legs.len()].leg.samples;
+        if let [first, second, ..] = &beside[..] {
+            samples.push((passage.t + second.0 - first.0, &second.1));
+        }
+    }
+    let n_guards = samples.first().map_or(0, |sample| sample.1.len());
+    let mut found = Vec::new();
+    for guard in 0..n_guards {
+        let size = samples.iter().map(|sample| sample.1[guard].abs());
+        let size = size.fold(0.0, f64::max);
+        let value = |three: &[(f64, &[f64])], k: usize| three[k].1[guard];
+        let minima = samples.windows(3).filter(|three| {
+            let [before, here, behind] = [0, 1, 2].map(|k| value(three, k));
+            here < before && here <= behind
+        });
+        // Far from zero, it is not near it whatever the parameter does next.
+        let near = minima
+            .enumerate()
+            .filter(|(_, three)| value(three, 1).abs() <= 0.5 * size);
+        found.extend(near.map(|(number, three)| Dip {
+            leg: i,
+            guard,
+            number,
+            times: [0, 1, 2].map(|k| three[k].0),
+        }));
+    }
+    found
+}
