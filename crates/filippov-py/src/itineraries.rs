@@ -6,8 +6,8 @@ use filippov::action::Actions;
 use filippov::derivative::{Extended, Extension, HeldMotion};
 use filippov::motion::{Guard, RootEnd};
 use filippov::{
-    equations, state_after, Dip, Equations, GuardRates, InstantRecord, ItineraryError,
-    ItineraryLeg, LegEnd, Mode, Options, Passage, PiecewiseSystem, Reached, Unknowns,
+    equations, state_after, Dip, Equations, GuardRates, InstantRecord, ItineraryLeg, LegEnd,
+    LegError, Mode, Options, Passage, PiecewiseSystem, Reached, Unknowns,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -256,7 +256,8 @@ impl HeldMotions {
     }
 
     /// The equations of an itinerary at these unknowns: the states at the starts of its legs one after the other, how long they
-    /// last, and when the first one starts. A leg that cannot be followed is named in a `ValueError`.
+    /// last, and when the first one starts.
+    #[allow(clippy::too_many_arguments)]
     fn equations<'py>(
         &self,
         py: Python<'py>,
@@ -357,17 +358,15 @@ impl HeldMotions {
     }
 
     /// What was found, or why it was not.
-    fn checked<R>(&self, py: Python<'_>, found: Result<R, ItineraryError>) -> PyResult<R> {
+    fn checked<R>(&self, py: Python<'_>, found: Result<R, LegError>) -> PyResult<R> {
         if let Some(raised) = PyErr::take(py) {
             return Err(raised);
         }
         found.map_err(|error| match error {
-            ItineraryError::Argument(error) => refused(error),
-            ItineraryError::Raised(error) => raised(error),
-            ItineraryError::NoGuard { leg } => {
-                PyValueError::new_err(format!("the motion of piece {leg} has no such end"))
-            }
-            ItineraryError::Stopped { mode, t, stop } => {
+            LegError::Argument(error) => refused(error),
+            LegError::Raised(error) => raised(error),
+            LegError::NoGuard => PyValueError::new_err("the motion of a piece has no such end"),
+            LegError::Stopped { mode, t, stop } => {
                 let name = |j: usize| self.prepared.core().surface_name(j);
                 PyValueError::new_err(stop.message(t, &mode, name))
             }

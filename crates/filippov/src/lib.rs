@@ -110,8 +110,8 @@ pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, equations, field_off_surfaces, hidden_dynamics, intersection_field,
     message_of, not_finite, state_after, state_text, Classification, Dip, Equations, GuardRates,
-    HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, ItineraryError, ItineraryLeg, Leg,
-    LegEnd, NotFinitePlace, OffSurfaces, Passage, PointKind, Unknowns,
+    HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, ItineraryLeg, Leg, LegEnd, LegError,
+    NotFinitePlace, OffSurfaces, Passage, PointKind, Unknowns,
 };
 pub use integrate::{Integrator, Problem, Reached, ReplayError};
 pub use mode::{Mode, Signs};

@@ -5,6 +5,8 @@ Reference: Allgower, Georg, Introduction to Numerical Continuation Methods (2003
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,14 +14,14 @@ import numpy as np
 from filippov.cycles.motions import Array
 from filippov.errors import ModelError
 
-__all__ = ["Curve", "Place", "Step", "corrected", "cubic_through", "place_of", "tangent_of"]
+__all__ = ["Curve", "Place", "Step", "corrected", "guess_through", "place_of", "tangent_of"]
 
 _TOLERANCE = 1e-11
 # A step that short is not made; that before it is as long as the root of it.
 _ARRIVED, _NEXT_IS_LAST = 1e-12, 1e-6
 _MOST_STEPS = 12
 _ABSURD, _NEAR = 1e4, 1e-7
-# A cubic leads twice as far as its two points are apart, if the cosine between their directions is as large.
+# A polynomial leads twice as far as its points are apart, if the cosine between their directions is as large.
 _FAR, _ALONG = 2.0, 0.5
 
 
@@ -102,24 +104,30 @@ def place_of(curve: Curve, w: Array, jacobian: Array, along: Array | None = None
     return Place(w, scale, tangent_of(jacobian, scale, along))
 
 
-def cubic_through(here: Place, other: Place | None, ahead: float) -> Array:
+def guess_through(here: Place, others: Sequence[Place], ahead: float) -> Array:
     """Return a guess at the point in the plane that is `ahead` of a place, in its scaled unknowns.
 
-    It is on the cubic through both places in their directions, and straight ahead if that is not known.
+    It is on the polynomial through this place and others, nearest first, in their directions (Hermite's
+    interpolation). Those behind a bend are left out, and those nearer to one another than the guess.
     """
     w, scale, tangent = here
-    straight = tangent * scale
-    guess = w + ahead * straight
-    if other is None:
-        return np.asarray(guess)
-    width = float((other.w - w) / scale @ tangent)
-    slope = other.tangent * other.scale
-    speed = float(slope / scale @ tangent)
-    if width == 0.0 or abs(ahead) > _FAR * abs(width) or speed < _ALONG * np.linalg.norm(slope / scale):
-        return np.asarray(guess)
-    chord, share = (other.w - w) / width - straight, ahead / width
-    bend = slope / speed - straight
-    return np.asarray(guess + ahead * share * ((3.0 - 2.0 * share) * chord + (share - 1.0) * bend))
+    nodes, offsets, slopes = [0.0], [np.zeros_like(w)], [tangent * scale]
+    for other in others:
+        offset, slope = other.w - w, other.tangent * other.scale
+        node, speed = float(offset / scale @ tangent), float(slope / scale @ tangent)
+        is_bent = speed < _ALONG * np.linalg.norm(slope / scale)
+        if is_bent or node == 0.0 or abs(ahead) > _FAR * min(abs(node - known) for known in nodes):
+            break
+        nodes.append(node)
+        offsets.append(offset)
+        slopes.append(slope / speed)
+    guess = w.copy()
+    for k, node in enumerate(nodes):
+        apart = [node - other for other in nodes[:k] + nodes[k + 1 :]]
+        weight = math.prod(1.0 + (ahead - node) / width for width in apart) ** 2
+        bend = 1.0 - 2.0 * (ahead - node) * sum(1.0 / width for width in apart)
+        guess += weight * (bend * offsets[k] + (ahead - node) * slopes[k])
+    return guess
 
 
 def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:

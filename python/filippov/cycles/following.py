@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from filippov.cycles.arclength import Place, Step, corrected, cubic_through, place_of
+from filippov.cycles.arclength import Place, Step, corrected, guess_through, place_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_of, in_parts
@@ -41,6 +41,8 @@ AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 _STEP_BEHIND = 2e-3
+# So many places before the last one say where the next one is.
+_EARLIER = 2
 _WIDTH = 1e-13
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
@@ -310,7 +312,8 @@ class _Side:
         self.special: list[Special] = []
         self.reason, self.is_stopped = "interrupted", False
         self.here: _Position
-        self.before: Place | None = None
+        # The places before this one with the same itinerary, the latest first.
+        self.earlier: list[Place] = []
         self._go_on(self._position(start, direction), start)
 
     def _position(self, state: State, direction: float) -> _Position:
@@ -330,7 +333,8 @@ class _Side:
 
     def _go_on(self, position: _Position, state: State) -> None:
         """Take a position as the next point of the branch."""
-        self.before = self.here.place if self.points and self.here.curve is position.curve else None
+        is_next = self.points and self.here.curve is position.curve
+        self.earlier = [self.here.place, *self.earlier[: _EARLIER - 1]] if is_next else []
         self.here = position
         value = float(position.place.w[-1])
         self.points.append(Point({self.settings.name: value}, state, position.tests))
@@ -455,7 +459,7 @@ class _Side:
         curve, here, _ = self.here
         w, scale, tangent = here
         low, high = self.settings.bounds
-        step = corrected(curve, cubic_through(here, self.before, ds), scale, tangent)
+        step = corrected(curve, guess_through(here, self.earlier, ds), scale, tangent)
         if not low <= step.w[-1] <= high:
             bound = low if step.w[-1] < low else high
             share = (bound - w[-1]) / (step.w[-1] - w[-1])
@@ -543,7 +547,7 @@ class _Side:
         nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
-            point = corrected(curve, cubic_through(here, end.place, s), scale, tangent, level + s)
+            point = corrected(curve, guess_through(here, [end.place], s), scale, tangent, level + s)
             following = place_of(curve, point.w, point.jacobian, tangent)
             found = self._position_at(curve, following, point.jacobian).tests
             if key not in found:

@@ -3,15 +3,14 @@
 //! The unknowns are the states at the starts of the legs, then how long they last, and maybe the time at which the first one starts.
 //! Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems).
 
-use super::leg::{leg, Leg, Over};
+use super::leg::{leg, Leg, LegError, Over};
 use crate::derivative::{ActionAt, Extended, HeldMotion};
-use crate::error::{Error, FieldError};
+use crate::error::FieldError;
 use crate::integrate::Reached;
 use crate::mode::Mode;
 use crate::motion::Guard;
 use crate::options::Options;
 use crate::record::Gradient;
-use crate::status::Stop;
 use crate::system::{Actions, TracedSystem};
 use crate::vectors::dot;
 
@@ -108,41 +107,6 @@ pub struct Unknowns<'s> {
     pub places: usize,
 }
 
-/// Why there are no equations, or no state behind a motion.
-#[derive(Debug)]
-pub enum ItineraryError {
-    /// A motion cannot be followed for so long.
-    Stopped {
-        /// Its mode.
-        mode: Mode,
-        /// The last time.
-        t: f64,
-        /// Why.
-        stop: Stop,
-    },
-    /// The motion of a leg has no such guard.
-    NoGuard {
-        /// Its number.
-        leg: usize,
-    },
-    /// An argument is out of range.
-    Argument(Error),
-    /// A function of the user raised.
-    Raised(FieldError),
-}
-
-impl From<Error> for ItineraryError {
-    fn from(error: Error) -> Self {
-        ItineraryError::Argument(error)
-    }
-}
-
-impl From<FieldError> for ItineraryError {
-    fn from(error: FieldError) -> Self {
-        ItineraryError::Raised(error)
-    }
-}
-
 /// Follows the legs of an itinerary, and returns its equations; `interrupt` is asked every few steps of each leg.
 ///
 /// # Errors
@@ -153,7 +117,7 @@ pub fn equations(
     legs: &[ItineraryLeg],
     at: Unknowns,
     interrupt: &mut dyn FnMut(Reached) -> bool,
-) -> Result<Equations, ItineraryError> {
+) -> Result<Equations, LegError> {
     let impacts = extended.impacts();
     let motion = |leg: &ItineraryLeg, q: &[f64]| {
         HeldMotion::new((system, extended), &impacts, options, &leg.mode, q)
@@ -177,7 +141,7 @@ pub fn equations(
         let mut passage = pass(
             of,
             options,
-            (i, &legs[i], &mut motions[i]),
+            (&legs[i], &mut motions[i]),
             over,
             t + duration,
             interrupt,
@@ -214,15 +178,15 @@ pub fn equations(
 fn pass(
     of: (&TracedSystem, &Extended, &Actions),
     options: &Options,
-    (i, own, motion): (usize, &ItineraryLeg, &mut HeldMotion),
+    (own, motion): (&ItineraryLeg, &mut HeldMotion),
     mut over: Over,
     t: f64,
     interrupt: &mut dyn FnMut(Reached) -> bool,
-) -> Result<Passage, ItineraryError> {
+) -> Result<Passage, LegError> {
     let (_, extended, actions) = of;
     if let LegEnd::Guard(guard) = own.end {
         let place = motion.guards().iter().position(|known| *known == guard);
-        over.ending = Some(place.ok_or(ItineraryError::NoGuard { leg: i })?);
+        over.ending = Some(place.ok_or(LegError::NoGuard)?);
     }
     let found = leg(of, options, motion, over, interrupt)?;
     let act = |index: usize, x: &[f64], q: &[f64]| -> Result<ActionAt, FieldError> {

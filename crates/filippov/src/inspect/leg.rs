@@ -1,8 +1,7 @@
 //! A motion that is held in one mode over a given time, whatever its guards are: a leg of an itinerary.
 
-use super::itinerary::ItineraryError;
 use crate::derivative::{Column, Extended, GuardAt, HeldMotion, Tangents};
-use crate::error::FieldError;
+use crate::error::{Error, FieldError};
 use crate::integrate::{Problem, Reached};
 use crate::mode::Mode;
 use crate::options::{Keep, Options};
@@ -86,7 +85,7 @@ pub fn leg(
         ending,
     }: Over,
     interrupt: &mut dyn FnMut(Reached) -> bool,
-) -> Result<Leg, ItineraryError> {
+) -> Result<Leg, LegError> {
     let n = start.len();
     let impacts = extended.impacts();
     let parameters = 0..extended.n_parameters();
@@ -154,7 +153,7 @@ pub fn state_after(
     mode: &Mode,
     (span, start): ((f64, f64), &[f64]),
     interrupt: &mut dyn FnMut(Reached) -> bool,
-) -> Result<Vec<f64>, ItineraryError> {
+) -> Result<Vec<f64>, LegError> {
     let options = Options {
         keep: Keep::Last,
         dense_output: false,
@@ -168,13 +167,45 @@ pub fn state_after(
 }
 
 /// A solution that comes to its end.
-fn complete(solution: Solution, mode: &Mode) -> Result<Solution, ItineraryError> {
+fn complete(solution: Solution, mode: &Mode) -> Result<Solution, LegError> {
     match solution.stop {
         Stop::End => Ok(solution),
-        stop => Err(ItineraryError::Stopped {
+        stop => Err(LegError::Stopped {
             mode: mode.clone(),
             t: solution.t_last,
             stop,
         }),
+    }
+}
+
+/// Why there is no leg.
+#[derive(Debug)]
+pub enum LegError {
+    /// A motion cannot be followed for so long.
+    Stopped {
+        /// Its mode.
+        mode: Mode,
+        /// The last time.
+        t: f64,
+        /// Why.
+        stop: Stop,
+    },
+    /// The motion has no such guard.
+    NoGuard,
+    /// An argument is out of range.
+    Argument(Error),
+    /// A function of the user raised.
+    Raised(FieldError),
+}
+
+impl From<Error> for LegError {
+    fn from(error: Error) -> Self {
+        LegError::Argument(error)
+    }
+}
+
+impl From<FieldError> for LegError {
+    fn from(error: FieldError) -> Self {
+        LegError::Raised(error)
     }
 }

@@ -14,9 +14,9 @@ mod off_surfaces;
 pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
 pub use itinerary::{
-    equations, Dip, Equations, GuardRates, ItineraryError, ItineraryLeg, LegEnd, Passage, Unknowns,
+    equations, Dip, Equations, GuardRates, ItineraryLeg, LegEnd, Passage, Unknowns,
 };
-pub use leg::{state_after, Leg};
+pub use leg::{state_after, Leg, LegError};
 pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
