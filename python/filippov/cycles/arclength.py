@@ -127,7 +127,7 @@ def guess_through(here: Place, others: Sequence[Place], ahead: float) -> Array:
         weight = math.prod(1.0 + (ahead - node) / width for width in apart) ** 2
         bend = 1.0 - 2.0 * (ahead - node) * sum(1.0 / width for width in apart)
         guess += weight * (bend * offsets[k] + (ahead - node) * slopes[k])
-    return guess
+    return np.asarray(guess)
 
 
 def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:
