@@ -613,6 +613,8 @@ def test_cycles_begin_at_a_hopf_point_of_the_sliding_motion(a: float) -> None:
     rests = fl.continuation(rest, "mu", (-1.0, 1.0))
     (hopf,) = rests.special["HB"]
     assert abs(hopf.params["mu"]) < 1e-10
+    with pytest.raises(fl.InputError, match="parameter: the system has no parameter 'nu'"):
+        fl.continuation(hopf, "nu", (-1.0, 1.0))
     cycles = fl.continuation(hopf, "mu", (-1.0, 1.0))
     assert cycles.reasons == {
         "below": f"it starts at {hopf!r}",

@@ -145,7 +145,11 @@ def continuation(
         from filippov.cycles.curves import curve_in_two
 
         return curve_in_two(start, tuple(parameter), bounds, step, max_points, progress)
-    first = _other_branch(start, parameter) if isinstance(start, Special) else start
+    first: Any = start
+    if isinstance(start, Special):
+        _check_parameter(start.state, parameter)
+        low, high = bounds_of(bounds, parameter)
+        first = _other_branch(start, parameter, high - low)
     if not isinstance(first, (Cycle, Equilibrium)):
         raise InputError(
             f"start: a cycle, an equilibrium or a special point is needed, not {type(start).__name__}"
@@ -197,8 +201,7 @@ def _checked(
     most: Any,
     progress: Any,
 ) -> _Settings:
-    if name not in start.params or name in start.system.discrete:
-        raise InputError(f"parameter: {start.system.no_parameter(name)}")
+    _check_parameter(start, name)
     low, high = bounds_of(bounds, name)
     value = start.params[name]
     if not low <= value <= high:
@@ -221,6 +224,18 @@ def _checked(
         BranchBar({name: (low, high)}) if progress else None,
         lambda: None,
     )
+
+
+def _check_parameter(state: State, name: str) -> None:
+    """Refuse a name that is not that of a parameter.
+
+    Raises
+    ------
+    InputError
+        If it is such a one.
+    """
+    if name not in state.params or name in state.system.discrete:
+        raise InputError(f"parameter: {state.system.no_parameter(name)}")
 
 
 def bounds_of(bounds: Any, name: str) -> tuple[float, float]:
@@ -793,11 +808,11 @@ def _is_real(key: Any, state: State) -> bool:
     return True
 
 
-def _other_branch(special: Special, name: str) -> State:
+def _other_branch(special: Special, name: str, size: float) -> State:
     """Return a state of the other branch through a special point."""
     from filippov.cycles.switching import other_branch
 
-    return other_branch(special, name)
+    return other_branch(special, name, size)
 
 
 def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:

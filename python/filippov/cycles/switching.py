@@ -23,8 +23,16 @@ from filippov.errors import InputError, ModelError
 __all__ = ["other_branch", "single_at_doubling"]
 
 
-def other_branch(special: Special, name: str) -> State:
+def other_branch(special: Special, name: str, size: float) -> State:
     """Return a point of the other branch through a special point, a little way along it.
+
+    Parameters
+    ----------
+    special : Special
+    name : str
+        The parameter.
+    size : float
+        The size by which it is measured.
 
     Raises
     ------
@@ -37,7 +45,7 @@ def other_branch(special: Special, name: str) -> State:
     if special.code == "BE" and isinstance(state, Equilibrium):
         return _behind_boundary(special, state, name)
     if special.code == "HB" and isinstance(state, Equilibrium):
-        return _cycle_at_hopf(state, name)
+        return _cycle_at_hopf(state, name, size)
     if special.code not in ("PD", "BP"):
         raise InputError(
             f"start: other branches begin at PD, BP, BE and HB, not at {special.code}; a curve in two "
@@ -45,12 +53,11 @@ def other_branch(special: Special, name: str) -> State:
         )
     if not isinstance(state, Cycle):
         raise InputError("start: other branches of equilibria begin at BE and HB")
-    size = abs(state.params[name]) or 1.0
     cycle = _doubled(state) if special.code == "PD" else state.from_event()
     return _beside(CycleCurve(cycle, (name,), (size,)), special.code)
 
 
-def _cycle_at_hopf(state: Equilibrium, name: str) -> Cycle:
+def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
     """Return a small cycle around an equilibrium with a critical pair of eigenvalues, on its surfaces."""
     own = state._curve
     values, vectors = np.linalg.eig(own.linearisation(state._w))
@@ -63,16 +70,15 @@ def _cycle_at_hopf(state: Equilibrium, name: str) -> Cycle:
     motions = own.motions.with_derivatives_by(())
     motions.use(state.params)
     discrete = motions.record((0.0, 1e-9), state.y).discrete
-    size = float(np.max(np.abs(state.y))) or 1.0
-    bordered = (name,), (abs(state.params[name]) or 1.0,)
+    extent = float(np.max(np.abs(state.y))) or 1.0
     for share in (1e-2, 1e-3, 1e-1, 1e-4):
-        start = state.y + share * size * along
+        start = state.y + share * extent * along
         leg = Leg(own.mode, discrete, None)
         itinerary = Itinerary((leg,), 0.0, (start,), (2 * np.pi / frequency,))
         shooting = Shooting(motions.copy(), itinerary, None)
         u = shooting.unknowns(itinerary)
         try:
-            curve = CycleCurve(Cycle(shooting, u, shooting.shoot(u), 0.0), *bordered)
+            curve = CycleCurve(Cycle(shooting, u, shooting.shoot(u), 0.0), (name,), (size,))
             scale = curve.scales(curve.start)
             # The amplitude is kept, and the parameter follows from it.
             across = np.zeros(len(curve.start))
