@@ -242,12 +242,14 @@ def _refined(motions: Motions, guess: float) -> float:
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    samples = _Samples(motions, _CONFIRMED_AT)
-    now, later = (samples.at(period * samples.units + wait) for wait in (0.0, period))
-    is_finite = np.isfinite(now) & np.isfinite(later)
-    now, later = now[is_finite], later[is_finite]
-    size = max(1.0, float(abs(now).max(initial=0.0)))
-    return bool(abs(later - now).max(initial=0.0) <= 1e-11 * size)
+    units, states, signs = _places(motions.n, motions.prepared.core.n_surfaces, _CONFIRMED_AT)
+    times = (period * units, period * (1.0 + units))
+    found = motions.right_hand_sides(
+        np.concatenate(times), np.concatenate([states, states]), np.concatenate([signs, signs])
+    )
+    known = np.isfinite(found).reshape(2, -1).all(axis=0)
+    now, later = found.reshape(2, -1)[:, known]
+    return bool(abs(later - now).max(initial=0.0) <= 1e-11 * abs(now).max(initial=1.0))
 
 
 def _size(motions: Motions) -> float:

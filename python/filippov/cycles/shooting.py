@@ -174,10 +174,8 @@ class Shooting:
         self.t0 = itinerary.t0
         self.is_free_in_time = period is not None and itinerary.is_closed_by_event()
         self.n, self.m = motions.n, len(self.legs)
-        self._reference = itinerary.starts[0].copy()
-        first = self.legs[0]
-        self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
         self._guess = itinerary
+        self.refer_to(itinerary.starts[0])
         # The parts of a divided motion keep their shares of it.
         durations = itinerary.durations
         self._shares = [
@@ -195,7 +193,7 @@ class Shooting:
         return np.where(np.isfinite(found), found, 0.0)
 
     def refer_to(self, u: Array) -> None:
-        """Fix the phase of a cycle that starts at no event beside another one."""
+        """Fix the phase of a cycle that starts at no event beside another one; `u` may be its start alone."""
         if self.period is not None or self.legs[-1].ending is not None:
             return
         first = self.legs[0]
