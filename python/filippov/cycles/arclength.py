@@ -111,23 +111,23 @@ def guess_through(here: Place, others: Sequence[Place], ahead: float) -> Array:
     interpolation). Those behind a bend are left out, and those nearer to one another than the guess.
     """
     w, scale, tangent = here
-    nodes, offsets, slopes = [0.0], [np.zeros_like(w)], [tangent * scale]
+    # In scaled unknowns, from here.
+    nodes, known, weights = [0.0], [tangent], []
     for other in others:
-        offset, slope = other.w - w, other.tangent * other.scale
-        node, speed = float(offset / scale @ tangent), float(slope / scale @ tangent)
-        is_bent = speed < _ALONG * np.linalg.norm(slope / scale)
-        if is_bent or node == 0.0 or abs(ahead) > _FAR * min(abs(node - known) for known in nodes):
+        offset, slope = (other.w - w) / scale, other.tangent * (other.scale / scale)
+        node, speed = float(offset @ tangent), float(slope @ tangent)
+        is_bent = speed < _ALONG * math.sqrt(slope @ slope)
+        if is_bent or node == 0.0 or abs(ahead) > _FAR * min(abs(node - other) for other in nodes):
             break
         nodes.append(node)
-        offsets.append(offset)
-        slopes.append(slope / speed)
-    guess = w.copy()
+        known += [offset, slope / speed]
     for k, node in enumerate(nodes):
-        apart = [node - other for other in nodes[:k] + nodes[k + 1 :]]
-        weight = math.prod(1.0 + (ahead - node) / width for width in apart) ** 2
-        bend = 1.0 - 2.0 * (ahead - node) * sum(1.0 / width for width in apart)
-        guess += weight * (bend * offsets[k] + (ahead - node) * slopes[k])
-    return np.asarray(guess)
+        apart, left = [node - other for other in nodes[:k] + nodes[k + 1 :]], ahead - node
+        weight = math.prod([1.0 + left / width for width in apart]) ** 2
+        if k > 0:
+            weights.append(weight * (1.0 - 2.0 * left * sum([1.0 / width for width in apart])))
+        weights.append(weight * left)
+    return np.asarray(w + scale * (np.array(weights) @ np.array(known)))
 
 
 def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:

@@ -111,6 +111,32 @@ pub struct Unknowns<'s> {
 ///
 /// # Errors
 /// If a leg cannot be followed, or a function of the user raises.
+///
+/// # Example
+///
+/// ```
+/// use filippov::derivative::Extension;
+/// use filippov::{equations, ItineraryLeg, LegEnd, Mode, Options, Rules, TracedSystem, Unknowns};
+/// use filippov_expr::{Backend, Graph, Names};
+///
+/// // x' = -x for one unit of time, from x = 2.
+/// let mut graph = Graph::new();
+/// let x = graph.state(0);
+/// let field = vec![graph.neg(x)];
+/// let names = Names { states: Vec::new(), parameters: Vec::new() };
+/// let system = TracedSystem::new(graph, field, Vec::new(), names, Backend::Interpreter)?;
+///
+/// let none = filippov::action::Actions::none();
+/// let extension = Extension::new(&system, &Rules::default(), &[])?;
+/// let extended = extension.at(system.parameters(), &none)?.expect("no map is called");
+/// let leg = ItineraryLeg { mode: Mode::new(Vec::new()), q: Vec::new(), end: LegEnd::Open, acts: Vec::new() };
+/// let at = Unknowns { starts: &[2.0], durations: &[1.0], t0: 0.0, is_free_in_time: false, places: 0 };
+/// let options = Options { rtol: 1e-12, ..Options::default() };
+/// let found = equations((&system, &extended, &none), &options, &[leg], at, &mut |_| false).unwrap();
+/// assert!((found.monodromy[0] - (-1.0_f64).exp()).abs() < 1e-11);
+/// assert!((found.residual[0] - 2.0 * (found.monodromy[0] - 1.0)).abs() < 1e-11);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn equations(
     (system, extended, actions): (&TracedSystem, &Extended, &Actions),
     options: &Options,
