@@ -5,13 +5,14 @@
 
 use super::leg::{leg, Leg, LegError, Over};
 use crate::derivative::{ActionAt, Extended, HeldMotion};
-use crate::error::FieldError;
+use crate::error::{Error, FieldError};
 use crate::integrate::Reached;
 use crate::mode::Mode;
 use crate::motion::Guard;
 use crate::options::Options;
 use crate::record::Gradient;
-use crate::system::{Actions, TracedSystem};
+use crate::system::{Actions, PiecewiseSystem, TracedSystem};
+use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
 
 /// A leg of an itinerary.
@@ -57,7 +58,7 @@ pub struct Passage {
     pub map: Option<Vec<Vec<f64>>>,
     /// The discrete states behind the end.
     pub q: Vec<f64>,
-    /// The guards and their rates before the end and behind it, if they are asked for and a guard ends the leg.
+    /// The guards and their rates before the end and behind it, if they are asked for and something ends the leg.
     pub sides: Option<[GuardRates; 2]>,
 }
 
@@ -110,7 +111,7 @@ pub struct Unknowns<'s> {
 /// Follows the legs of an itinerary, and returns its equations; `interrupt` is asked every few steps of each leg.
 ///
 /// # Errors
-/// If a leg cannot be followed, or a function of the user raises.
+/// If a mode does not fit the system, a leg cannot be followed, or a function of the user raises.
 ///
 /// # Example
 ///
@@ -144,6 +145,15 @@ pub fn equations(
     at: Unknowns,
     interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<Equations, LegError> {
+    let expected = system.n_surfaces();
+    if let Some(leg) = legs.iter().find(|leg| leg.mode.entries().len() != expected) {
+        return Err(Error::WrongCount {
+            name: "mode",
+            found: leg.mode.entries().len(),
+            expected,
+        }
+        .into());
+    }
     let impacts = extended.impacts();
     let motion = |leg: &ItineraryLeg, q: &[f64]| {
         HeldMotion::new((system, extended), &impacts, options, &leg.mode, q)
@@ -172,7 +182,7 @@ pub fn equations(
             t + duration,
             interrupt,
         )?;
-        if at.places > 0 && matches!(legs[i].end, LegEnd::Guard(_)) {
+        if at.places > 0 && !goes_on(&legs[i]) {
             let next = (i + 1) % legs.len();
             let before = rates(&mut motions[i], passage.t, &passage.leg.x)?;
             let behind = match passage.q == legs[next].q {
@@ -406,38 +416,53 @@ fn monodromy(passages: &[Passage]) -> Vec<f64> {
         .collect()
 }
 
-/// Where the guards of a leg have minima near zero, by their values at some places.
+/// Does the motion of a leg go on in the next one?
+fn goes_on(leg: &ItineraryLeg) -> bool {
+    matches!(leg.end, LegEnd::Open | LegEnd::Cut(_))
+}
+
+/// Where the guards of a leg have minima near zero, by their values at some places and their rates at the ends.
 fn dips(legs: &[ItineraryLeg], passages: &[Passage], i: usize) -> Vec<Dip> {
-    let passage = &passages[i];
-    let mut samples: Vec<(f64, &[f64])> = Vec::new();
-    samples.extend(
-        passage
-            .leg
-            .samples
-            .iter()
-            .map(|(t, values)| (*t, &values[..])),
-    );
-    if matches!(legs[i].end, LegEnd::Open | LegEnd::Cut(_)) {
-        // The next leg goes on with it.
-        let beside = &passages[(i + 1) % legs.len()].leg.samples;
+    let (m, passage) = (legs.len(), &passages[i]);
+    let own = passage.leg.samples.iter();
+    let mut samples: Vec<(f64, &[f64])> = own.map(|(t, values)| (*t, &values[..])).collect();
+    if goes_on(&legs[i]) {
+        let beside = &passages[(i + 1) % m].leg.samples;
         if let [first, second, ..] = &beside[..] {
             samples.push((passage.t + second.0 - first.0, &second.1));
         }
     }
-    let n_guards = samples.first().map_or(0, |sample| sample.1.len());
+    let [Some(first), Some(last)] = [samples.first(), samples.last()].map(Option::<&_>::copied) else {
+        return Vec::new();
+    };
+    // A minimum between the first two places, or the last two, shows by the rate at the end beside it.
+    let at_start = passages[(i + m - 1) % m].sides.as_ref().map(|sides| &sides[1].1);
+    let at_end = passage.sides.as_ref().map(|sides| &sides[0].1);
     let mut found = Vec::new();
-    for guard in 0..n_guards {
+    for guard in 0..first.1.len() {
         let size = samples.iter().map(|sample| sample.1[guard].abs());
         let size = size.fold(0.0, f64::max);
-        let value = |three: &[(f64, &[f64])], k: usize| three[k].1[guard];
-        let minima = samples.windows(3).filter(|three| {
-            let [before, here, behind] = [0, 1, 2].map(|k| value(three, k));
-            here < before && here <= behind
+        // The rate of a guard that begins or ends at zero may be rounding.
+        let is_clear = |(_, values): (f64, &[f64])| values[guard] > AT_SIDE * size;
+        let falls = is_clear(first) && at_start.is_some_and(|rates| rates[guard] < 0.0);
+        let rises = is_clear(last) && at_end.is_some_and(|rates| rates[guard] > 0.0);
+        let mut places = samples.clone();
+        if falls {
+            places.insert(0, first);
+        }
+        if rises {
+            places.push(last);
+        }
+        let is_first = |k: usize| k == 0 && falls;
+        let minima = places.windows(3).enumerate().filter(|(k, three)| {
+            let [before, here, behind] = [0, 1, 2].map(|k| three[k].1[guard]);
+            (here < before || is_first(*k)) && here <= behind
         });
         // Far from zero, it is not near it whatever the parameter does next.
         let near = minima
+            .map(|(_, three)| three)
             .enumerate()
-            .filter(|(_, three)| value(three, 1).abs() <= 0.5 * size);
+            .filter(|(_, three)| three[1].1[guard].abs() <= 0.5 * size);
         found.extend(near.map(|(number, three)| Dip {
             leg: i,
             guard,
