@@ -28,6 +28,7 @@ from filippov.events import Event, accepted_names
 from filippov.modes import Mode
 from filippov.notices import show_warnings
 from filippov.options import check_time, check_y0
+from filippov.scalars import positive
 from filippov.solution import Solution
 from filippov.system import System
 
@@ -172,7 +173,7 @@ class Cycle:
         -------
         ndarray, shape (n,)
         """
-        itinerary, motions = self._parts, self._shooting.motions
+        itinerary, motions, t = self._parts, self._shooting.motions, check_time(t)
         rounding = 1e-10 * self.period
         t = self.t0 + (t - self.t0 + rounding) % self.period - rounding
         since = self.t0
@@ -245,6 +246,8 @@ class Cycle:
         ModelError
             If the cycle is not isolated.
         """
+        if not isinstance(name, str):
+            raise InputError(f"name: the name of a parameter is needed, not {name!r}")
         if name not in self.params or name in self.system.discrete:
             raise InputError(f"name: {self.system.no_parameter(name)}")
         shooting = self._with_derivatives_by((name,))
@@ -361,7 +364,8 @@ def follows_itinerary(cycle: Cycle) -> bool:
     end = record.solution.sol(t + period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
-    return bool(is_same and np.max(np.abs(end - x)) < (1e-6 + 1e-9 * growth) * size)
+    near = (1e-6 + 1e-9 * growth) * size + cycle._shooting.motions.negligible
+    return bool(is_same and np.max(np.abs(end - x)) < near)
 
 
 def _kinds(itinerary: Itinerary) -> list[object]:
@@ -445,6 +449,8 @@ def limit_cycle(
         isinstance(transient, bool) or not isinstance(transient, int) or transient < 0
     ):
         raise InputError(f"transient: a number of periods is needed, not {transient!r}")
+    if period is not None and not callable(period):
+        period = positive("period", period)
     start, t0 = check_y0(y0, states=system._states), check_time(t0)
     motions = Motions(system, len(start), system.parameter_values(params), (), options)
     motions.watched = "search of the cycle" if progress else ""
@@ -453,12 +459,14 @@ def limit_cycle(
         t0, period = anchor.offset, anchor.period
     if itinerary is not None:
         found = _from_itinerary(motions, itinerary, period)
-    elif period is not None and transient == 0 and not _is_forced(motions, t0, start, period):
-        if callable(period):
-            raise InputError("period: the guess of a period is a number")
-        found = cycle_at(motions, t0, start, float(period), None)
-    else:
+    elif period is None or _is_forced(motions, t0, start, period):
         found = _simulated(motions, t0, start, period, transient)
+    elif callable(period):
+        raise InputError("period: without forcing it is a guess, a number")
+    elif transient == 0:
+        found = cycle_at(motions, t0, start, period, None)
+    else:
+        found = _simulated(motions, t0, start, None, transient)
     moved = _moved_to(found, anchor, t0)
     if motions.warnings:
         show_warnings(motions.warnings, moved.solution)
@@ -566,14 +574,36 @@ def _is_forced(motions: Motions, t0: float, x: Array, period: Any) -> bool:
 
 def _from_itinerary(motions: Motions, given: Itinerary | Cycle, period: Any) -> Cycle:
     if isinstance(given, Cycle):
+        _check_fits(motions, given._parts)
         own = given._shooting.period
         return cycle_of(motions, given._parts, own if period is None else GivenPeriod(period))
     if not isinstance(given, Itinerary):
         raise InputError(f"itinerary: that of a cycle is needed, not {type(given).__name__}")
+    _check_fits(motions, given)
     forced = None if period is None else GivenPeriod(period)
     if forced is not None:
         forced.multiple = max(1, round(given.period / forced.value(motions)))
     return cycle_of(motions, given, forced)
+
+
+def _check_fits(motions: Motions, itinerary: Itinerary) -> None:
+    """Refuse an itinerary whose pieces the system does not have.
+
+    Raises
+    ------
+    InputError
+        If it is such a one.
+    """
+    prepared = motions.prepared
+    n_discrete = len(motions.record((0.0, 1e-9), itinerary.starts[0]).discrete)
+    for k, (leg, start) in enumerate(zip(itinerary.legs, itinerary.starts, strict=True)):
+        fits = len(start) == motions.n and len(leg.mode) == prepared.core.n_surfaces
+        if fits and len(leg.discrete) == n_discrete and leg.ending is not None:
+            guard, acts = leg.ending.guard, leg.ending.acts
+            fits = guard is None or guard in motions.guards(leg.mode, leg.discrete)
+            fits = fits and all(act < len(prepared.actions) for act in acts)
+        if not fits or len(leg.discrete) != n_discrete:
+            raise InputError(f"itinerary: piece {k} is not one of this system")
 
 
 def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: int | None) -> Cycle:

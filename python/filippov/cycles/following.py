@@ -6,7 +6,8 @@ Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -156,6 +157,8 @@ def continuation(
         )
     if isinstance(first, Cycle):
         first = first.from_event().in_first_period()
+    if store is not None and not isinstance(store, (str, PathLike)):
+        raise InputError(f"store: a path is needed, not {store!r}")
     if store is not None and not Path(store).parent.is_dir():
         raise InputError(f"store: there is no folder {Path(store).parent}")
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
@@ -179,6 +182,8 @@ def continuation(
                 sides[0].reason = f"it starts at {start!r}"
             else:
                 sides[-1].follow()
+            if sides[-1].is_closed:
+                break  # the other direction is the same branch
     except KeyboardInterrupt as interrupt:
         save()
         interrupt.partial = _joined(sides, settings)  # type: ignore[attr-defined]
@@ -209,7 +214,7 @@ def _checked(
     if switch not in ("follow", "stop", "ignore"):
         raise InputError(f'switch: "follow", "stop" or "ignore", not {switch!r}')
     codes = CODES if isinstance(detect, str) and detect == "all" else detect
-    if isinstance(codes, str) or any(code not in CODES for code in codes):
+    if isinstance(codes, str) or not isinstance(codes, Iterable) or any(c not in CODES for c in codes):
         raise InputError(f'detect: "all" or codes among {", ".join(CODES)}, not {detect!r}')
     share = _FIRST_STEP if step is None else positive("step", step) / (high - low)
 
@@ -325,11 +330,12 @@ class _Side:
         self.settings, self.direction = settings, direction
         self.points: list[Point] = []
         self.special: list[Special] = []
-        self.reason, self.is_stopped = "interrupted", False
+        self.reason, self.is_stopped, self.is_closed = "interrupted", False, False
         self.here: _Position
         # The places before this one with the same itinerary, the latest first.
         self.earlier: list[Place] = []
-        self._go_on(self._position(start, direction), start)
+        self.start = self._position(start, direction)
+        self._go_on(self.start, start)
 
     def _position(self, state: State, direction: float) -> _Position:
         """Return the position of a state, from which the parameter goes in a direction."""
@@ -396,19 +402,38 @@ class _Side:
         """Whether the branch has come back to where it started."""
         if len(self.points) < 6:
             return False
-        first, before, last = self.points[0], *self.points[-2:]
-        name = self.settings.name
+        name, first = self.settings.name, self.points[0]
         value = first.params[name]
-        if (before.params[name] - value) * (last.params[name] - value) > 0:
-            return False
         try:
-            again = at_value(last.state, name, value)
+            if self._passes_start():
+                again: State = self._beside_start()
+            elif (self.points[-2].params[name] - value) * (self.points[-1].params[name] - value) <= 0:
+                again = at_value(self.points[-1].state, name, value)
+            else:
+                return False
         except ModelError:
             return False
         if not _is_same(again, first.state):
             return False
         self.reason = f"the branch is closed: it comes back to its start at {name} = {value:.6g}"
+        self.is_closed = True
         return True
+
+    def _passes_start(self) -> bool:
+        """Whether the last step leads through the plane across the branch at its start, near that."""
+        start, curve = self.start, self.here.curve
+        if self.earlier == [] or not _is_alike(start.curve, curve):
+            return False
+        w, scale, tangent = start.place
+        before, now = ((place.w - w) / scale for place in (self.earlier[0], self.here.place))
+        is_near = np.linalg.norm(now) < 2.0 * np.linalg.norm(now - before)
+        return bool(before @ tangent < 0.0 <= now @ tangent and is_near)
+
+    def _beside_start(self) -> State:
+        """Return the state of the curve that is followed in the plane across the branch at its start."""
+        w, scale, tangent = self.start.place
+        step = corrected(self.here.curve, self.here.place.w, scale, tangent, float(w / scale @ tangent))
+        return self.here.curve.state(step.w, step.error)
 
     def _vanishes(self) -> bool:
         """Whether a cycle without switches has shrunk to an equilibrium, where its branch ends."""
@@ -441,10 +466,15 @@ class _Side:
             return False
         name, value = self.settings.name, float(self.here.place.w[-1])
         starts = (np.max(np.abs(np.array(cycle.itinerary.starts))) for cycle in (first, last))
-        grown = next(starts) * _UNBOUNDED < next(starts)
-        if grown and _size_of(last) > _UNBOUNDED * _size_of(first):
-            self.reason = f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
-            return True
+        if next(starts) * _UNBOUNDED < next(starts):
+            size = _size_of(first)
+            # One that rests at the origin has no size to compare with.
+            size = size if size > first._shooting.motions.negligible else 1.0
+            if _size_of(last) > _UNBOUNDED * size:
+                self.reason = (
+                    f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
+                )
+                return True
         if last.is_forced:
             return False
         values = []
@@ -770,11 +800,25 @@ def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
 def _is_same(one: State, other: State) -> bool:
     """Whether two states are the same, from wherever they start."""
     if isinstance(one, Cycle) and isinstance(other, Cycle):
-        own, its = (np.sort(np.linalg.norm(np.array(c.itinerary.starts), axis=1)) for c in (one, other))
-        is_as_long = abs(one.period - other.period) < 1e-7 * other.period
-        return is_as_long and len(own) == len(its) and np.allclose(own, its, rtol=1e-6)
+        if abs(one.period - other.period) > 1e-7 * other.period:
+            return False
+        starts = [np.array(cycle.itinerary.starts) for cycle in (one, other)]
+        own, its = starts
+        near = 1e-6 * float(np.max(np.abs(its))) + other._shooting.motions.negligible
+        turned = (np.roll(own, k, axis=0) for k in range(len(own)))
+        return len(own) == len(its) and any(np.max(np.abs(rows - its)) < near for rows in turned)
     if isinstance(one, Equilibrium) and isinstance(other, Equilibrium):
         return one.mode == other.mode and np.allclose(one.y, other.y, rtol=1e-7, atol=1e-9)
+    return False
+
+
+def _is_alike(one: AnyCurve, other: AnyCurve) -> bool:
+    """Whether two curves are in the same unknowns."""
+    if isinstance(one, CycleCurve) and isinstance(other, CycleCurve):
+        legs = one.shooting.legs, other.shooting.legs
+        return len(legs[0]) == len(legs[1]) and all(a.is_alike(b) for a, b in zip(*legs, strict=True))
+    if isinstance(one, EquilibriumCurve) and isinstance(other, EquilibriumCurve):
+        return one.mode == other.mode
     return False
 
 
@@ -823,6 +867,8 @@ def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:
     points = backward.points[::-1]
     special = [s._replace(point=max(last - s.point - (s.code != "EP"), 0)) for s in backward.special[::-1]]
     reasons = {"below": backward.reason}
+    if backward.is_closed:
+        reasons["above"] = backward.reason
     if forward is not None:
         points = points + forward.points[1:]
         special += [s._replace(point=s.point + last) for s in forward.special]

@@ -89,7 +89,7 @@ class GivenPeriod:
         """Return the period for the parameters of the motions."""
         try:
             found = float(self.phase.period_at(motions.params))
-        except TypeError as error:
+        except (TypeError, ValueError) as error:
             raise InputError(f"period: it is a function of parameters by their names: {error}") from None
         if not np.isfinite(found) or found <= 0:
             raise InputError(f"period: it is positive, not {found}")
@@ -119,11 +119,15 @@ class InferredPeriod:
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
         self.guess, self.multiple = guess, multiple
         self._known: tuple[dict[str, float], float] | None = None
+        # What was known where it was found: the forcing may vanish at other parameters.
+        self._earlier: tuple[dict[str, float], float] | None = None
         self.exponents = {} if exponents is None else exponents
 
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
-        return InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+        found = InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+        found._earlier = self._known or self._earlier
+        return found
 
     def twice(self) -> InferredPeriod:
         """Return it for cycles of twice the period."""
@@ -140,17 +144,34 @@ class InferredPeriod:
     def _single(self, motions: Motions) -> float:
         params = motions.params
         if self._known is None:
-            self._known = params, _refined(motions, self.guess)
+            self._known = params, self._first(motions)
         elif self._known[0] != params:
-            known, period = self._known
-            changed = [name for name in params if params[name] != known[name]]
-            if all(self._exponent(motions, name, known, period).is_integer() for name in changed):
-                for name in changed:
-                    period *= _ratio(name, params[name], known[name], self.exponents[name])
+            period = self._moved(motions, self._known)
             if not _repeats(motions, period):
                 period = _refined(motions, period)
             self._known = params, period
         return self._known[1]
+
+    def _first(self, motions: Motions) -> float:
+        """Return the period near the guess, or where nothing shows it what it is by its factors."""
+        try:
+            return _refined(motions, self.guess)
+        except ModelError:
+            if self._earlier is None:
+                raise
+            period = self._moved(motions, self._earlier)
+            if not _repeats(motions, period):
+                raise
+            return period
+
+    def _moved(self, motions: Motions, known: tuple[dict[str, float], float]) -> float:
+        """Return the period known at some parameters at those of the motions, if they are factors of it."""
+        params, (others, period) = motions.params, known
+        changed = [name for name in params if params[name] != others[name]]
+        if all(self._exponent(motions, name, others, period).is_integer() for name in changed):
+            for name in changed:
+                period *= _ratio(name, params[name], others[name], self.exponents[name])
+        return period
 
     def slopes(self, motions: Motions) -> Array:
         """Return its derivatives by the parameters of the motions."""

@@ -140,7 +140,7 @@ def _signature(leg: Leg) -> tuple[object, ...]:
 def itinerary_of(record: Record, t0: float, t1: float) -> Itinerary:
     """Return the itinerary of a run between two times; the run lasts a little longer.
 
-    If something happens at the last time because it is that time, the cycle starts behind it.
+    If something happens at the last time, the cycle starts behind it.
 
     Raises
     ------
@@ -150,9 +150,9 @@ def itinerary_of(record: Record, t0: float, t1: float) -> Itinerary:
     rounding = 1e-9 * (t1 - t0)
     all_changes = _changes(record)
     earlier = [instant for instant in all_changes if instant.times[0] <= t0 + rounding]
-    start = _place_in(record, earlier, t0)
+    start = _place_in(record, earlier, t0, rounding)
     found = [instant for instant in all_changes if t0 + rounding < instant.times[0] < t1 + rounding]
-    if found and not found[-1].guards and found[-1].times[0] > t1 - rounding:
+    if found and found[-1].times[0] > t1 - rounding:
         return _between(start, found, None)
     return _between(start, [instant for instant in found if instant.times[0] < t1], t1)
 
@@ -201,11 +201,9 @@ def _changes(record: Record) -> list[Instant]:
     return found
 
 
-def _place_in(record: Record, earlier: Sequence[Instant], t: float) -> Instant:
+def _place_in(record: Record, earlier: Sequence[Instant], t: float, rounding: float) -> Instant:
     """Return a place of a run as an instant at which nothing happens, or the one that is there."""
-    if earlier and abs(earlier[-1].times[0] - t) <= 1e-9 * abs(t - record.solution.t[0]):
-        return earlier[-1]
-    if earlier and earlier[-1].times[0] == t:
+    if earlier and abs(earlier[-1].times[0] - t) <= rounding:
         return earlier[-1]
     mode = earlier[-1].modes[1] if earlier else record.mode
     q = earlier[-1].discrete[1] if earlier else record.discrete

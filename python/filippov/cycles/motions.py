@@ -173,6 +173,11 @@ class Motions:
         return dict(self._params)
 
     @property
+    def negligible(self) -> float:
+        """A difference of states that the runs do not resolve: ten times their absolute tolerance."""
+        return 10.0 * float(np.max(self.options["atol"]))
+
+    @property
     def prepared(self) -> Prepared:
         """The system of the core."""
         return self._prepared
@@ -306,8 +311,16 @@ class Motions:
         return np.concatenate([field, self._core.surface_values(t, x, signs, self._vector)])
 
     def right_hand_sides(self, times: Array, states: Array, signs: Array) -> Array:
-        """Return the same at several places, a row for each."""
-        return self._core.right_hand_sides(times, states, signs, self._vector)
+        """Return the same at several places, a row for each, with what the maps of resets make of them."""
+        found = [self._core.right_hand_sides(times, states, signs, self._vector)]
+        for action in self._prepared.actions:
+            if isinstance(action.map, TracedSystem):
+                # Behind the states of a map are the discrete ones.
+                own = np.zeros((len(times), action.map.n_states))
+                own[:, : self.n] = states
+                signs_of_map = np.resize(signs, (len(times), action.map.n_surfaces))
+                found.append(action.map.right_hand_sides(times, own, signs_of_map, self._vector))
+        return np.hstack(found) if len(found) > 1 else found[0]
 
     def _motions(self) -> HeldMotions:
         if self._held is None:

@@ -320,7 +320,9 @@ def scales(shooting: Shooting, u: Array) -> Array:
     starts, durations, _ = shooting.parts(u)
     # A state that is small where the legs start is not small in between.
     size = np.maximum(np.max(np.abs(starts), axis=0), shooting.swing)
-    size = np.maximum(size, 1e-3 * max(float(np.max(size)), 1e-300))
+    largest = float(np.max(size))
+    # A cycle that rests at the origin has no size of its own.
+    size = np.maximum(size, 1e-3 * largest if largest > shooting.motions.negligible else 1.0)
     period = float(sum(durations))
     parts = [np.tile(size, shooting.m), np.full(shooting.m, period)]
     if shooting.is_free_in_time:
@@ -360,7 +362,9 @@ def solve(
             if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
                 break
             found = shooting.shoot(u)
-            if found.fastest < _SHRUNK * at_first:
+            moves = found.fastest * sum(shooting.parts(u)[1])
+            rests = found.fastest < _SHRUNK * at_first or moves <= _SHRUNK * float(np.max(np.abs(u)))
+            if rests and shooting.period is None:
                 raise ModelError("Newton's method leads to an equilibrium, and to no cycle")
             return u, found, size
         best = min(best, size)

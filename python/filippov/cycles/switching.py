@@ -70,8 +70,10 @@ def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
     motions = own.motions.with_derivatives_by(())
     motions.use(state.params)
     discrete = motions.record((0.0, 1e-9), state.y).discrete
-    extent = float(np.max(np.abs(state.y))) or 1.0
-    for share in (1e-2, 1e-3, 1e-1, 1e-4):
+    largest = float(np.max(np.abs(state.y)))
+    # At the origin the equilibrium has no size to compare with.
+    extent = largest if largest > motions.negligible else 1.0
+    for share in (1e-2, 1e-3, 1e-1, 1e-4, 1e-5, 1e-6):
         start = state.y + share * extent * along
         leg = Leg(own.mode, discrete, None)
         itinerary = Itinerary((leg,), 0.0, (start,), (2 * np.pi / frequency,))
