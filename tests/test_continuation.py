@@ -725,3 +725,65 @@ def test_a_branch_ends_at_a_homoclinic_orbit(eps: float) -> None:
     assert far.trivial_error < 1e-6
     assert far.is_stable == (eps > 0)
     assert far.is_admissible
+
+
+@pytest.mark.parametrize("centre", [0.0, 1e-3, 1.0])
+def test_cycles_begin_at_a_hopf_point_anywhere(centre: float) -> None:
+    def normal_form(t: float, x: Any, m: float = 0.2) -> list[Any]:
+        u, v = x[0] - centre, x[1] - centre
+        return [m * u - v - u * (u * u + v * v), u + m * v - v * (u * u + v * v)]
+
+    rests = fl.continuation(fl.equilibrium(fl.System(normal_form, n=2), [centre, centre]), "m", (-0.5, 0.5))
+    cycles = fl.continuation(rests.special["HB"][0], "m", (-0.5, 0.5))
+    assert cycles.reasons["above"] == "m = 0.5 is the end of the range"
+    for point in cycles.points:
+        assert abs(np.sum((point.state.y0 - centre) ** 2) - point.params["m"]) < 1e-9
+
+
+def test_a_mirror_image_is_another_cycle() -> None:
+    # A ball on a moving table: the cycles that are struck on the way up and on the way down meet at a fold.
+    strike = fl.Reset(
+        lambda t, x, w: x[0] - 0.435 * np.sin(w * t),
+        lambda t, x, w: [x[0], -0.5 * x[1] + 1.5 * 0.435 * w * np.cos(w * t)],
+        direction="down",
+    )
+    ball = fl.System(lambda t, x, w=5.0: [x[1], -9.81], n=2, resets=strike)
+    branch = fl.continuation(fl.limit_cycle(ball, [0.533, -5.508], transient=0), "w", (4.8, 5.5))
+    assert codes(branch) == ["EP", "LP", "EP"]
+    assert set(branch.reasons.values()) == {"w = 5.5 is the end of the range"}
+    # Closed form: 1.5 A w cos(phi) = (1 + r) g pi / w at the strike, and the fold is at phi = 0.
+    assert abs(branch.special["LP"][0].params["w"] ** 2 - 9.81 * np.pi / (3 * 0.435)) < 1e-8
+
+
+def test_a_closed_branch_is_followed_once() -> None:
+    isola = fl.System(lambda t, x, p=0.0: [1 - p * p - (x[0] - 3) ** 2 + 0.05 * np.sin(t)], n=1)
+    branch = fl.continuation(fl.limit_cycle(isola, [4.0]), "p", (-2, 2))
+    again = fl.continuation(branch.special["LP"][0].state, "p", (-2, 2))
+    for one in (branch, again):
+        assert codes(one) == ["LP", "LP"]
+        assert all("the branch is closed" in reason for reason in one.reasons.values())
+        assert len(one) < 100
+
+
+def test_a_guard_that_dips_beside_the_start_of_a_long_piece() -> None:
+    cycle = fl.limit_cycle(friction(omega=0.031), [1.0, 2.0])
+    branch = fl.continuation(cycle, "omega", (0.027, 0.032))
+    (adding,) = branch.special["AS"]
+    omega = adding.params["omega"]
+    modes = [
+        len(fl.limit_cycle(friction(omega=value), [1.0, 2.0], t0=1.0).modes)
+        for value in (omega + 1e-6, omega - 1e-6)
+    ]
+    assert modes == [29, 33]
+    assert all(point.state.is_admissible for point in branch.points)
+
+
+def test_a_branch_through_a_forcing_of_no_size() -> None:
+    forced = fl.System(lambda t, x, A=1.0: [x[1], -x[0] - 0.3 * x[1] + A * np.sin(2 * t)], n=2)
+    branch = fl.continuation(fl.limit_cycle(forced, [0.3, 0.0]), "A", (-1.0, 2.0))
+    rest = branch.at(A=0.0)
+    assert np.max(np.abs(rest.y0)) < 1e-12
+    assert abs(rest.period - np.pi) < 1e-12
+    for wrong in ({"detect": None}, {"detect": 5}, {"store": 5}):
+        with pytest.raises(fl.InputError, match=next(iter(wrong))):
+            fl.continuation(rest, "A", (-1.0, 2.0), **wrong)

@@ -317,3 +317,116 @@ def test_cycles_along_which_perturbations_grow_very_much() -> None:
         # Along them perturbations grow by more than 1e18 at mu = 4.
         growth = np.log(float(np.max(np.abs(there.multipliers))))
         assert growth > 10 * mu - 4
+
+
+def test_a_cycle_that_starts_at_a_switch() -> None:
+    kick = fl.Reset(lambda t, x, w: np.sin(w * t), lambda t, x, J: [x[0], -0.5 * x[1] + J], direction="up")
+    kicked = fl.System(
+        lambda t, x, w=1.0, J=0.3: [x[1], -0.2 * x[1] - 2 * x[0] + 0.1 * np.cos(w * t)], n=2, resets=kick
+    )
+    elsewhere = fl.limit_cycle(kicked, [1.0, 2.0], t0=1.0)
+    # The start is behind the kick at time 0.
+    cycle = fl.limit_cycle(kicked, [1.0, 2.0])
+    assert cycle.is_admissible
+    np.testing.assert_allclose(cycle.multipliers, elsewhere.multipliers, rtol=1e-9)
+    np.testing.assert_allclose(cycle.at(1.0), elsewhere.y0, rtol=1e-9)
+    np.testing.assert_allclose(cycle.at(0.0)[1], -0.5 * cycle.at(0.0, before=True)[1] + 0.3, rtol=1e-9)
+    d = 1e-5
+    above, below = (fl.limit_cycle(kicked, [1.0, 2.0], {"J": 0.3 + move}).y0 for move in (d, -d))
+    np.testing.assert_allclose(cycle.derivative("J").y0, (above - below) / (2 * d), rtol=1e-6)
+
+    relay = fl.System(lambda t, x: [-0.3 * x[0] - np.sign(x[0] - 0.1) + 2.5 * np.sin(2 * t)], n=1)
+    cycle = fl.limit_cycle(relay, [0.0])
+    switch = cycle.itinerary.durations[0]
+    for move in (-1e-8, -2e-9, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 2e-9, 1e-6):
+        again = fl.limit_cycle(relay, [0.0], t0=switch + move)
+        assert again.is_admissible
+        np.testing.assert_allclose(again.multipliers, cycle.multipliers, rtol=1e-9)
+
+
+@pytest.mark.parametrize("T", [0.7, 2.0])
+def test_the_period_of_a_clock_follows_its_parameter(T: float) -> None:
+    # Closed form: the state at the start of the half in which it rises is -tanh(T / 4).
+    wave = fl.System(lambda t, x, T=2.0: [-x[0] + np.where(t % T < 0.5 * T, 1.0, -1.0)], n=1)
+    cycle = fl.limit_cycle(wave, [0.0], {"T": T})
+    assert abs(cycle.y0[0] + np.tanh(T / 4)) < 1e-11
+    derivative = cycle.derivative("T")
+    assert abs(derivative.period - 1) < 1e-10
+    assert abs(derivative.y0[0] + 0.25 / np.cosh(T / 4) ** 2) < 1e-9
+    branch = fl.continuation(cycle, "T", (0.5, 3.0))
+    assert branch.reasons == {
+        "below": "T = 0.5 is the end of the range",
+        "above": "T = 3 is the end of the range",
+    }
+    for point in branch.points:
+        state, period = point.state, point.params["T"]
+        assert abs(state.period - period) < 1e-10
+        assert abs(state.y0[0] + np.tanh(period / 4)) < 1e-10
+        assert abs(state.multipliers[0] - np.exp(-period)) < 1e-9
+
+
+def test_a_period_of_a_clock_that_is_no_power_of_a_parameter(tmp_path: Any) -> None:
+    wave = fl.System(lambda t, x, a=1.0, b=1.0: [-x[0] + np.where(t % (a + b) < a, 1.0, -1.0)], n=1)
+    cycle = fl.limit_cycle(wave, [0.0])
+    assert abs(cycle.derivative("a").period - 1) < 1e-9
+    branch = fl.continuation(cycle, "a", (0.5, 2.0), store=tmp_path / "branch.json")
+    assert abs(branch.at(a=1.7).period - 2.7) < 1e-10
+    again = fl.cycles.load_branch(tmp_path / "branch.json", wave)
+    assert abs(again.at(a=1.7).period - 2.7) < 1e-10
+
+
+@pytest.mark.parametrize("transient", [0, None])
+def test_time_in_the_map_of_a_reset_is_forcing(transient: int | None) -> None:
+    # A ball on a table that moves by little beside its height: x' = v, v' = -g, struck at x = 0.
+    strike = fl.Reset(
+        lambda t, x: x[0], lambda t, x, w: [x[0], -0.5 * x[1] + 0.6525 * w * np.cos(w * t)], direction="down"
+    )
+    ball = fl.System(lambda t, x, w=5.0: [x[1], -9.81], n=2, resets=strike)
+    cycle = fl.limit_cycle(ball, [0.39, -5.508], transient=transient)
+    assert cycle.is_forced
+    assert abs(cycle.period - 2 * np.pi / 5) < 1e-12
+    # Closed form: the speed of the strike is that of a flight of one period.
+    assert abs(abs(cycle.itinerary.starts[1][1]) - 9.81 * np.pi / 5) < 1e-10
+    dose = fl.Reset(period=1.0, map=lambda t, x: [x[0] + 1 + 0.5 * np.sin(2.5 * t + 0.3)])
+    with pytest.raises(fl.ModelError, match="does not repeat itself in 64 of them: give period="):
+        fl.limit_cycle(fl.System(lambda t, x: [-0.8 * x[0]], n=1, resets=dose), [0.0], t0=0.2)
+
+
+def test_a_cycle_that_rests_at_zero() -> None:
+    held = fl.System(lambda t, x, A=0.5: [-np.sign(x[0]) + A * np.sin(t)], n=1)
+    cycle = fl.limit_cycle(held, [0.3])
+    assert cycle.is_admissible
+    assert cycle.y0 == 0
+    assert cycle.derivative("A").y0 == 0
+    branch = fl.continuation(cycle, "A", (0.2, 3.0))
+    assert branch.reasons["above"] == "A = 3 is the end of the range"
+    assert abs(branch.special["AS"][0].params["A"] - 1) < 1e-10
+    moving = fl.limit_cycle(held, [0.3], {"A": 1.5})
+    assert abs(branch.at(A=1.5).period - moving.period) < 1e-12
+    np.testing.assert_allclose(branch.at(A=1.5).at(2.0), moving.at(2.0), atol=1e-10)
+
+
+def test_wrong_guesses_of_cycles() -> None:
+    belt = fl.System(lambda t, x: [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1])], n=2)
+    pol = fl.System(lambda t, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], n=2)
+    cycle = fl.limit_cycle(pol, [1.0, 0.0])
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.3, 0.3)
+    held = fl.System(lambda t, x: [x[1], -x[0] - 0.3 * x[1] + np.sin(t) - 0.4 * relay(t, x)], n=2)
+    for system, other in ((pol, belt), (belt, held), (held, belt)):
+        with pytest.raises(fl.InputError, match="itinerary: piece 0 is not one of this system"):
+            fl.limit_cycle(system, [1.0, 0.0], itinerary=fl.limit_cycle(other, [1.0, 2.0]))
+    with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
+        fl.limit_cycle(pol, [0.0, 0.0], period=6.0, transient=0)
+    for period in (-6.0, np.nan, "x"):
+        with pytest.raises(fl.InputError, match="period: a positive number is needed"):
+            fl.limit_cycle(pol, [1.0, 0.0], period=period, transient=0)
+    # A guess is not needed where the run comes to the cycle.
+    assert abs(fl.limit_cycle(pol, [1.0, 0.0], period=6.5).period - cycle.period) < 1e-9
+    for name in (5, ["mu"]):
+        with pytest.raises(fl.InputError, match="name: the name of a parameter is needed"):
+            cycle.derivative(name)
+    with pytest.raises(fl.InputError, match="t: a finite time is needed"):
+        cycle.at("a")
+    sampled = fl.Reset(period=0.5, map=lambda t, x: [0.5 * np.sign(x[0] + t)])
+    with pytest.raises(fl.InputError, match="system: the map of the reset 'reset' is not traced"):
+        fl.limit_cycle(fl.System(lambda t, x: [-x[0]], n=1, resets=sampled), [1.0])

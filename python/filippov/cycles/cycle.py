@@ -14,10 +14,12 @@ from filippov.analysis.sections import as_section
 from filippov.cycles.forcing import (
     GivenPeriod,
     InferredPeriod,
+    TickedPeriod,
     common_period,
     depends_on_time,
     forcing_of,
     refuse_other_period,
+    ticks_of,
 )
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
@@ -615,9 +617,9 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
     else:
         span, solution = _first_span(motions, t0, x)
         steps = np.diff(solution.t)
-        ticks = _ticks(motions, t0, x, span)
+        ticks = ticks_of(motions, t0, x, span)
         if ticks is not None:
-            forcing = GivenPeriod(common_period(motions, ticks))
+            forcing = TickedPeriod((t0, x), common_period(motions, ticks))
         elif depends_on_time(motions, span):
             step = float(np.median(steps[steps > 0]))
             forcing = forcing_of(motions, 0.5 * step, span)
@@ -641,21 +643,6 @@ def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]
         if len(solution.t) > 400 or len(solution.switches) > 60 or span > 1e8:
             return span, solution
         span *= 4.0
-
-
-def _ticks(motions: Motions, t0: float, x: Array, span: float) -> float | None:
-    """Return the period of the known times of clocks and resets; None if there are none."""
-    record = motions.record((t0, t0 + span), x)
-    times = np.unique(
-        [instant.times[0] for instant in record.instants if not instant.guards and instant.acts]
-    )
-    if len(times) < 3:
-        return None
-    gaps = np.diff(times)
-    for k in range(1, len(gaps) // 2 + 1):
-        if np.allclose(gaps[k:], gaps[:-k], rtol=1e-9):
-            return float(np.sum(gaps[:k]))
-    raise ModelError("things happen at known times that do not repeat themselves: give period=")
 
 
 def _repeated_forced(

@@ -16,15 +16,19 @@ from filippov.scalars import positive
 __all__ = [
     "GivenPeriod",
     "InferredPeriod",
+    "TickedPeriod",
     "common_period",
     "depends_on_time",
     "forcing_of",
     "refuse_other_period",
+    "ticks_of",
 ]
 
 _PLACES, _CONFIRMED_AT, _MOST_MULTIPLES, _WINDOW = 7, 3, 64, 4000
 
 
+# A run of so many periods shows how often clocks tick.
+_SPAN_OF_TICKS = 3.3
 _GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 
@@ -125,17 +129,32 @@ class InferredPeriod:
 
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
-        found = InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+        found = self._like(duration / self.multiple, self.multiple)
         found._earlier = self._known or self._earlier
         return found
 
     def twice(self) -> InferredPeriod:
         """Return it for cycles of twice the period."""
-        return InferredPeriod(self.guess, 2 * self.multiple, self.exponents)
+        return self._like(self.guess, 2 * self.multiple)
 
     def half(self) -> InferredPeriod:
         """Return it for cycles of half the period."""
-        return InferredPeriod(self.guess, self.multiple // 2, self.exponents)
+        return self._like(self.guess, self.multiple // 2)
+
+    def _like(self, guess: float, multiple: int) -> InferredPeriod:
+        return InferredPeriod(guess, multiple, self.exponents)
+
+    def _find(self, motions: Motions, guess: float) -> float:
+        """Return the period near a guess."""
+        return _refined(motions, guess)
+
+    def _confirms(self, motions: Motions, period: float) -> bool:
+        """Whether it is the period for the parameters of the motions."""
+        return _repeats(motions, period)
+
+    def _slope(self, motions: Motions, name: str, period: float) -> float:
+        """Return its derivative by a parameter."""
+        return _slope_of_period(motions, name, period)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -147,22 +166,18 @@ class InferredPeriod:
             self._known = params, self._first(motions)
         elif self._known[0] != params:
             period = self._moved(motions, self._known)
-            if not _repeats(motions, period):
-                period = _refined(motions, period)
+            if not self._confirms(motions, period):
+                period = self._find(motions, period)
             self._known = params, period
         return self._known[1]
 
     def _first(self, motions: Motions) -> float:
-        """Return the period near the guess, or where nothing shows it what it is by its factors."""
-        try:
-            return _refined(motions, self.guess)
-        except ModelError:
-            if self._earlier is None:
-                raise
+        """Return what it is by its factors, if it was known elsewhere, or the period near the guess."""
+        if self._earlier is not None:
             period = self._moved(motions, self._earlier)
-            if not _repeats(motions, period):
-                raise
-            return period
+            if self._confirms(motions, period):
+                return period
+        return self._find(motions, self.guess)
 
     def _moved(self, motions: Motions, known: tuple[dict[str, float], float]) -> float:
         """Return the period known at some parameters at those of the motions, if they are factors of it."""
@@ -182,7 +197,7 @@ class InferredPeriod:
             if exponent.is_integer() and params[name] != 0.0:
                 found.append(exponent * period / params[name])
             else:
-                found.append(_slope_of_period(motions, name, period))
+                found.append(self._slope(motions, name, period))
         return self.multiple * np.array(found)
 
     def _exponent(self, motions: Motions, name: str, params: dict[str, float], period: float) -> float:
@@ -191,12 +206,63 @@ class InferredPeriod:
             latest = motions.params
             motions.use(params)
             try:
-                found = _slope_of_period(motions, name, period) * params[name] / period
+                found = self._slope(motions, name, period) * params[name] / period
             finally:
                 motions.use(latest)
             is_whole = abs(found - round(found)) < 1e-8 and params[name] != 0.0
             self.exponents[name] = float(round(found)) if is_whole else 0.5
         return self.exponents[name]
+
+
+class TickedPeriod(InferredPeriod):
+    """A multiple of the period of clocks, found from the times at which they tick in a run.
+
+    Parameters
+    ----------
+    start : (float, ndarray of shape (n,))
+        Where the run starts.
+    guess, multiple, exponents
+        As for `InferredPeriod`.
+    """
+
+    def __init__(
+        self,
+        start: tuple[float, Array],
+        guess: float,
+        multiple: int = 1,
+        exponents: dict[str, float] | None = None,
+    ) -> None:
+        super().__init__(guess, multiple, exponents)
+        self.start = start
+
+    def _like(self, guess: float, multiple: int) -> InferredPeriod:
+        return TickedPeriod(self.start, guess, multiple, self.exponents)
+
+    def _find(self, motions: Motions, guess: float) -> float:
+        ticks = ticks_of(motions, *self.start, _SPAN_OF_TICKS * guess)
+        if ticks is None:
+            raise ModelError(
+                f"clocks do not tick as often as every {guess:.6g} units of time: {_GIVE_PERIOD}"
+            )
+        return ticks * max(1, round(guess / ticks))
+
+    def _confirms(self, motions: Motions, period: float) -> bool:
+        try:
+            return abs(self._find(motions, period) - period) < 1e-9 * period and _repeats(motions, period)
+        except ModelError:
+            return False
+
+    def _slope(self, motions: Motions, name: str, period: float) -> float:
+        params = motions.params
+
+        def at(change: float) -> Array:
+            motions.use({**params, name: params[name] + change})
+            return np.array([self._find(motions, period)])
+
+        try:
+            return float(_slope(at, 1e-3 * max(abs(params[name]), 1e-6))[0])
+        finally:
+            motions.use(params)
 
 
 def _ratio(name: str, value: float, known: float, exponent: float) -> float:
@@ -317,6 +383,27 @@ def refuse_other_period(motions: Motions, period: float) -> None:
     left = _difference(motions, period)
     if np.max(np.abs(left), initial=0.0) > 1e-6 * _size(motions):
         raise InputError(f"period: field and switching functions are not the same after {period:.9g}")
+
+
+def ticks_of(motions: Motions, t0: float, x: Array, span: float) -> float | None:
+    """Return the period of the known times of clocks and resets in a run; None if there are none.
+
+    Raises
+    ------
+    ModelError
+        If they have none.
+    """
+    record = motions.record((t0, t0 + span), x)
+    times = np.unique(
+        [instant.times[0] for instant in record.instants if not instant.guards and instant.acts]
+    )
+    if len(times) < 3:
+        return None
+    gaps = np.diff(times)
+    for k in range(1, len(gaps) // 2 + 1):
+        if np.allclose(gaps[k:], gaps[:-k], rtol=1e-9):
+            return float(np.sum(gaps[:k]))
+    raise ModelError(f"things happen at known times that do not repeat themselves: {_GIVE_PERIOD}")
 
 
 def common_period(motions: Motions, ticks: float) -> float:

@@ -14,7 +14,7 @@ from filippov.cycles.branch import Branch, Point, Special, State
 from filippov.cycles.curves import OnCurve
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.following import at_value
-from filippov.cycles.forcing import GivenPeriod, InferredPeriod
+from filippov.cycles.forcing import GivenPeriod, InferredPeriod, TickedPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
 from filippov.cycles.motions import Motions
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve
@@ -160,6 +160,7 @@ def _state(state: State) -> dict[str, Any]:
         "durations": list(itinerary.durations),
         "multiple": 0 if period is None else period.multiple,
         "is_given": isinstance(period, GivenPeriod),
+        "is_ticked": isinstance(period, TickedPeriod),
         "residual": state.residual,
     }
 
@@ -200,4 +201,8 @@ class _Builder:
             if self._period is None:
                 raise InputError("period: the branch was made with a period that was given: give it again")
             return GivenPeriod(self._period, multiple)
-        return InferredPeriod(sum(row["durations"]) / multiple, multiple)
+        single = sum(row["durations"]) / multiple
+        # Files of version 0.1 have no such periods.
+        if row.get("is_ticked", False):
+            return TickedPeriod((row["t0"], np.array(row["starts"][0])), single, multiple)
+        return InferredPeriod(single, multiple)
