@@ -765,6 +765,20 @@ def test_a_closed_branch_is_followed_once() -> None:
         assert len(one) < 100
 
 
+def test_a_closed_branch_of_cycles_without_switches() -> None:
+    # Closed form: |z| = 2 +- (1 - p^2)^(1/2), in skewed coordinates, in which the start moves along the cycle.
+    def skewed(t: float, x: Any, p: float = 0.0) -> list[Any]:
+        u, v = x[0], x[1] + 0.5 * p * x[0] + 0.2 * x[0] ** 2
+        grows, turns = 1 - p * p - ((u * u + v * v) ** 0.5 - 2) ** 2, 1 + 0.3 * p
+        du = u * grows - v * turns
+        return [du, v * grows + u * turns - (0.5 * p + 0.4 * x[0]) * du]
+
+    branch = fl.continuation(fl.limit_cycle(fl.System(skewed, n=2), [2.5, 0.0]), "p", (-2, 2))
+    assert sorted(round(point.params["p"], 9) for point in branch.special["LP"]) == [-1.0, 1.0]
+    assert all("the branch is closed" in reason for reason in branch.reasons.values())
+    assert all(abs(p.state.period - 2 * np.pi / (1 + 0.3 * p.params["p"])) < 1e-9 for p in branch.points)
+
+
 def test_a_guard_that_dips_beside_the_start_of_a_long_piece() -> None:
     cycle = fl.limit_cycle(friction(omega=0.031), [1.0, 2.0])
     branch = fl.continuation(cycle, "omega", (0.027, 0.032))

@@ -242,6 +242,21 @@ def test_derivatives_between_steps_are_those_of_runs_that_end_there(method: str)
     assert np.array_equal(last.derivative(), sol.derivative())
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_derivatives_of_a_run_that_keeps_its_end_alone(method: str) -> None:
+    # Closed form: x'' = -x - sign(z) with z' = 1 turns by 2 about (-1, 0), beside a surface never reached.
+    turning = fl.System(lambda t, x: [x[1], -x[0] - np.sign(x[2]), 1.0], n=3)
+    plain = fl.System(lambda t, x: [x[1], -x[0] - 1.0, 1.0], n=3)
+    c, s = np.cos(2.0), np.sin(2.0)
+    for system in (turning, plain):
+        options = {"wrt": "y0", "method": method, "rtol": 1e-9, "atol": 1e-9}
+        whole = system.solve((0, 2), [0.3, 0.5, 1.0], **options).derivative()
+        for kept in ({"keep": "last"}, {"dense_output": False}):
+            found = system.solve((0, 2), [0.3, 0.5, 1.0], **options, **kept).derivative()
+            assert np.array_equal(found, whole)
+            np.testing.assert_allclose(found, [[c, s, 0], [-s, c, 0], [0, 0, 1]], atol=1e-7)
+
+
 def touch(t: float, x: Any) -> Any:
     """Comes to y = 0 from above as (t - 1)^2 / 2 + y(0) - 1/2; below it is drawn back."""
     return np.where(x[1] > 0, [1.0, x[0], 2.0], [1.0, 1.0, 0.5])

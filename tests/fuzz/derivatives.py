@@ -40,6 +40,9 @@ LONGER = 1e-3
 # disagrees, the errors of its runs are measured too, as their distances from runs at a smaller tolerance.
 NOISE = 3e-12
 SMALLER = {"rtol": 1e-13, "atol": 1e-13}
+# For the comparison of records, by all methods.
+METHODS = ("DOPRI5", "DOP853", "Taylor", "Rodas5P")
+ROUGH = {"rtol": 1e-6, "atol": 1e-8}
 NAMED = {"one_sided", "no_derivative", "non_unique"}
 
 
@@ -186,9 +189,20 @@ def compare(seed: int) -> Compared:
             found.unsettled.append(column)
         else:
             found.wrong.append(f"d/d{column}: two sides without a warning")
+    found.wrong += _without_record(system, (t_end, y0, list(values)), seed)
     if is_named:
         found.outcome = "named" if confirmed else "named without need"
     return found
+
+
+def _without_record(system: fl.System, run: tuple[float, Array, list[str]], seed: int) -> list[str]:
+    """Return whether a run that keeps its end alone has other derivatives, by one of the methods."""
+    (t_end, y0, names), method = run, METHODS[seed % len(METHODS)]
+    options = {**OPTIONS, **ROUGH, "method": method, "wrt": ["y0", "t0", *names]}
+    whole, end = (system.solve((0.0, t_end), y0, keep=keep, **options) for keep in ("steps", "last"))
+    if np.array_equal(whole.derivative(), end.derivative(), equal_nan=True):
+        return []
+    return [f"{method}, keep='last': {end.derivative().tolist()} is not {whole.derivative().tolist()}"]
 
 
 class _Quotient(NamedTuple):

@@ -54,6 +54,8 @@ _NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
 _SAVED_EVERY = 50
+# So many points of a cycle are looked at to see whether a state is on it.
+_PHASES = 40
 # Their test functions change signs with the direction.
 _TURNING = ("LP", "PSN", "BP")
 
@@ -406,9 +408,9 @@ class _Side:
         value = first.params[name]
         try:
             if self._passes_start():
-                again: State = self._beside_start()
+                again = self._beside_start()
             elif (self.points[-2].params[name] - value) * (self.points[-1].params[name] - value) <= 0:
-                again = at_value(self.points[-1].state, name, value)
+                again = self._behind_at(value)
             else:
                 return False
         except ModelError:
@@ -434,6 +436,18 @@ class _Side:
         w, scale, tangent = self.start.place
         step = corrected(self.here.curve, self.here.place.w, scale, tangent, float(w / scale @ tangent))
         return self.here.curve.state(step.w, step.error)
+
+    def _behind_at(self, value: float) -> State:
+        """Return the state within the last step at which the parameter has a value."""
+        if not self.earlier or self.earlier[0].w[-1] == self.here.place.w[-1]:
+            return at_value(self.points[-1].state, self.settings.name, value)
+        curve, place, _ = self.here
+        back = self.earlier[0]
+        width = float((back.w - place.w) / place.scale @ place.tangent)
+        share = (value - place.w[-1]) / (back.w[-1] - place.w[-1])
+        guess = guess_through(place, self.earlier, share * width)
+        step = _at_parameter(curve, guess, value, place.scale)
+        return curve.state(step.w, step.error)
 
     def _vanishes(self) -> bool:
         """Whether a cycle without switches has shrunk to an equilibrium, where its branch ends."""
@@ -802,14 +816,26 @@ def _is_same(one: State, other: State) -> bool:
     if isinstance(one, Cycle) and isinstance(other, Cycle):
         if abs(one.period - other.period) > 1e-7 * other.period:
             return False
-        starts = [np.array(cycle.itinerary.starts) for cycle in (one, other)]
-        own, its = starts
+        if not one.is_forced and not one.itinerary.has_events():
+            return _is_on(other, one.at(one.t0 + 0.381966 * one.period))
+        own, its = (np.array(cycle.itinerary.starts) for cycle in (one, other))
         near = 1e-6 * float(np.max(np.abs(its))) + other._shooting.motions.negligible
         turned = (np.roll(own, k, axis=0) for k in range(len(own)))
         return len(own) == len(its) and any(np.max(np.abs(rows - its)) < near for rows in turned)
     if isinstance(one, Equilibrium) and isinstance(other, Equilibrium):
         return one.mode == other.mode and np.allclose(one.y, other.y, rtol=1e-7, atol=1e-9)
     return False
+
+
+def _is_on(cycle: Cycle, x: Array) -> bool:
+    """Whether a state is on a cycle, by the nearest of its points and the motion there."""
+    times = cycle.t0 + cycle.period * np.arange(_PHASES) / _PHASES
+    for width in (1.0, 0.05, 0.0025, 1e-4, 1e-6):
+        points = np.array([cycle.at(t) for t in times])
+        k = int(np.argmin(np.linalg.norm(points - x, axis=1)))
+        nearest, size = points[k], np.max(np.abs(points))
+        times = times[k] + cycle.period * width * np.linspace(-0.05, 0.05, 41)
+    return bool(np.max(np.abs(nearest - x)) < 1e-6 * size)
 
 
 def _is_alike(one: AnyCurve, other: AnyCurve) -> bool:

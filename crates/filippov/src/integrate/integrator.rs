@@ -339,7 +339,7 @@ impl<'a> Integrator<'a> {
             return Ok(Some(stop));
         }
         self.control.note_edge(longest, dt);
-        if self.recorder.keeps_dense() {
+        if self.recorder.needs_extensions() {
             self.stepper.extend_cheaply(&self.run.x);
         }
         let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);

@@ -159,9 +159,9 @@ impl<'a> Recorder<'a> {
         missing * bytes_of_switch(self.n)
     }
 
-    /// Are the continuous extensions kept?
-    pub fn keeps_dense(&self) -> bool {
-        self.keep_dense
+    /// Are the continuous extensions kept, or shown to an observer?
+    pub fn needs_extensions(&self) -> bool {
+        self.keep_dense || self.observed.is_some()
     }
 
     /// Does every step go into the result?
