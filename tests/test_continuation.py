@@ -766,7 +766,7 @@ def test_a_closed_branch_is_followed_once() -> None:
 
 
 def test_a_closed_branch_of_cycles_without_switches() -> None:
-    # Closed form: |z| = 2 +- (1 - p^2)^(1/2), in skewed coordinates, in which the start moves along the cycle.
+    # Closed form: |z| = 2 +- (1 - p^2)^(1/2), in skewed coordinates, in which the start moves along it.
     def skewed(t: float, x: Any, p: float = 0.0) -> list[Any]:
         u, v = x[0], x[1] + 0.5 * p * x[0] + 0.2 * x[0] ** 2
         grows, turns = 1 - p * p - ((u * u + v * v) ** 0.5 - 2) ** 2, 1 + 0.3 * p

@@ -432,11 +432,14 @@ fn dips(legs: &[ItineraryLeg], passages: &[Passage], i: usize) -> Vec<Dip> {
             samples.push((passage.t + second.0 - first.0, &second.1));
         }
     }
-    let [Some(first), Some(last)] = [samples.first(), samples.last()].map(Option::<&_>::copied) else {
+    let (Some(&first), Some(&last)) = (samples.first(), samples.last()) else {
         return Vec::new();
     };
     // A minimum between the first two places, or the last two, shows by the rate at the end beside it.
-    let at_start = passages[(i + m - 1) % m].sides.as_ref().map(|sides| &sides[1].1);
+    let at_start = passages[(i + m - 1) % m]
+        .sides
+        .as_ref()
+        .map(|sides| &sides[1].1);
     let at_end = passage.sides.as_ref().map(|sides| &sides[0].1);
     let mut found = Vec::new();
     for guard in 0..first.1.len() {
