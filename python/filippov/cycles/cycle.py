@@ -407,8 +407,8 @@ def limit_cycle(
         forcing at the time `t0`; else at a switch, that before its longest piece.
     period : float or callable, optional
         With forcing, its period: a number, or a function of parameters by their names; by default it is found
-        from field and switching functions. The cycle may have a multiple of it. Without forcing a guess of
-        the period of the cycle, used with ``transient=0``.
+        from the field, switching functions, maps of resets and clocks. The cycle may have a multiple of it.
+        Without forcing a guess of the period of the cycle, used with ``transient=0``.
     itinerary : Itinerary or Cycle, optional
         A cycle, or its pieces, to start Newton's method from; `y0` is not used then.
     t0 : float, optional
