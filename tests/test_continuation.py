@@ -801,3 +801,74 @@ def test_a_branch_through_a_forcing_of_no_size() -> None:
     for wrong in ({"detect": None}, {"detect": 5}, {"store": 5}):
         with pytest.raises(fl.InputError, match=next(iter(wrong))):
             fl.continuation(rest, "A", (-1.0, 2.0), **wrong)
+
+
+@pytest.mark.parametrize("current", [2.0, 0.0, -1.3])
+def test_a_branch_of_equilibria_through_kinks(current: float) -> None:
+    # One equilibrium for every current, with kinks where it is -0.25 and 0.25.
+    circuit = fl.System(
+        lambda t, s, feed=0.5: [
+            -s[0] + abs(s[0] + 1) - abs(s[0] - 1) - s[1] + feed,
+            0.1 * (s[0] - 0.8 * s[1]),
+        ],
+        n=2,
+    )
+    branch = fl.continuation(fl.equilibrium(circuit, [current, current], {"feed": current}), "feed", (-3, 3))
+    assert codes(branch) == ["EP", "BE", "BE", "EP"]
+    assert [round(point.params["feed"], 9) for point in branch.special] == [-3.0, -0.25, 0.25, 3.0]
+    tent = fl.System(lambda t, s, a=1.0: [a - abs(s[0] - 1)], n=1)
+    folds = fl.continuation(fl.equilibrium(tent, [1.9]), "a", (-2, 2))
+    assert codes(folds) == ["EP", "BE", "EP"]
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0])
+@pytest.mark.parametrize("unit", [1.0, 1e6, 1e-6])
+def test_a_boundary_equilibrium_at_any_value_and_in_any_unit(shift: float, unit: float) -> None:
+    system = fl.System(lambda t, s, a=1.0: [unit * np.where(s[0] > 0, a - shift - s[0] / unit, 1.0)], n=1)
+    start = fl.equilibrium(system, [0.9 * unit], {"a": 1 + shift})
+    branch = fl.continuation(start, "a", (shift - 2, shift + 2))
+    assert codes(branch) == ["EP", "BE", "EP"]
+    assert abs(branch.special["BE"][0].params["a"] - shift) < 1e-10
+    assert all(point.state.is_admissible for point in branch.points)
+    # Closed form: on the surface (1 - l) / 2 + a (1 + l) / 2 = 0.
+    below = branch.at(a=shift - 2.0)
+    assert abs(below.multipliers[0] + 1 / 3) < 1e-9
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0, 1e6, 1e-6])
+def test_folds_of_equilibria_in_any_unit(unit: float) -> None:
+    parabola = fl.System(lambda t, s, a=-0.25: [(a + (s[0] / unit) ** 2) * unit], n=1)
+    branch = fl.continuation(fl.equilibrium(parabola, [-0.45 * unit]), "a", (-1, 1))
+    assert codes(branch) == ["EP", "LP", "EP"]
+    assert abs(branch.special["LP"][0].params["a"]) < 1e-10
+    mixed = fl.System(lambda t, s, a=-1.0: [unit * (2 + 0.1 * s[1]) - s[0], a - s[1] ** 3 + s[1]], n=2)
+    branch = fl.continuation(fl.equilibrium(mixed, [1.9 * unit, -1.3]), "a", (-1, 1))
+    folds = sorted(point.params["a"] for point in branch.special["LP"])
+    np.testing.assert_allclose(folds, [-2 / 27**0.5, 2 / 27**0.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e-8, 1e8])
+def test_hopf_points_in_any_unit_of_time(rate: float) -> None:
+    normal_form = fl.System(
+        lambda t, s, mu=-0.5: [rate * (mu * s[0] - s[1] - s[0] ** 3), rate * (s[0] + mu * s[1] - s[1] ** 3)],
+        n=2,
+    )
+    branch = fl.continuation(fl.equilibrium(normal_form, [0.001, 0.001]), "mu", (-1, 1))
+    assert codes(branch) == ["EP", "HB", "EP"]
+    assert abs(branch.special["HB"][0].params["mu"]) < 1e-10
+
+
+def test_a_curve_of_hopf_points_ends_where_they_end() -> None:
+    # The normal form of Bogdanov and Takens: b1 = -b2^2 with b2 < 0.
+    system = fl.System(lambda t, s, b1=-1.0, b2=-1.5: [s[1], b1 + b2 * s[1] + s[0] ** 2 - s[0] * s[1]], n=2)
+    hopf = fl.continuation(fl.equilibrium(system, [-1.0, 0.0]), "b2", (-2, 1)).special["HB"][0]
+    ranges = {"b1": (-2, 1), "b2": (-2, 2)}
+    curve = fl.continuation(hopf, ("b1", "b2"), ranges)
+    assert all(abs(p.params["b1"] + p.params["b2"] ** 2) < 1e-9 for p in curve.points)
+    assert max(p.params["b2"] for p in curve.points) < 1e-9
+    assert "fold, on a curve of HB" in curve.reason
+    for wrong in ({"store": "curve.json"}, {"detect": ["LP"]}, {"switch": "stop"}, {"monitor": {"m": 1}}):
+        with pytest.raises(fl.InputError, match="a curve in two parameters has none"):
+            fl.continuation(hopf, ("b1", "b2"), ranges, **wrong)
+    with pytest.raises(fl.InputError, match="max_points: a positive whole number is needed"):
+        fl.continuation(hopf, ("b1", "b2"), ranges, max_points=0)

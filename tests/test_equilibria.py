@@ -169,3 +169,38 @@ def test_an_equilibrium_whose_multipliers_hold_no_motion_is_shown() -> None:
     assert corner
     assert all(len(point.eigenvalues) == 0 and not point.is_stable for point in corner)
     assert repr(found).count("Equilibrium(") == len(found)
+
+
+def test_eigenvalues_of_states_of_other_sizes() -> None:
+    # Closed forms. Differences over a share of the largest state saw none of these.
+    far = fl.System(
+        lambda t, s, mu=0.1: [1e4 - s[0], mu * s[1] - s[2] - np.tanh(s[1]) ** 3, s[1] + mu * s[2]], n=3
+    )
+    rest = fl.equilibrium(far, [1e4, 0.05, 0.05])
+    np.testing.assert_allclose(rest.eigenvalues, [0.1 + 1j, 0.1 - 1j, -1.0], rtol=1e-9)
+    assert not rest.is_stable
+    (hopf,) = fl.continuation(rest, "mu", (-1, 1)).special["HB"]
+    assert abs(hopf.params["mu"]) < 1e-10
+    small = fl.System(lambda t, s: [0.5 - s[0] / (1e-6 + s[0])], n=1)
+    np.testing.assert_allclose(fl.equilibrium(small, [0.9e-6]).eigenvalues, [-2.5e5], rtol=1e-9)
+    (found,) = fl.equilibria(small, [(0, 1e-5)])
+    np.testing.assert_allclose(found.eigenvalues, [-2.5e5], rtol=1e-9)
+    warm = fl.System(lambda t, s: [np.exp(10 * (s[0] - 300)) - 1], n=1)
+    np.testing.assert_allclose(fl.equilibrium(warm, [300.01]).eigenvalues, [10.0], rtol=1e-9)
+
+
+def test_eigenvalues_beside_the_end_of_a_domain() -> None:
+    # Two tanks, of which one is nearly empty.
+    tanks = fl.System(lambda t, h, q=0.2: [100 * q - np.sqrt(h[0]), q - np.sqrt(h[1])], n=2)
+    rest = fl.equilibrium(tanks, [390.0, 0.05])
+    np.testing.assert_allclose(rest.eigenvalues, [-0.025, -2.5], rtol=1e-9)
+    (found,) = fl.equilibria(tanks, [(1, 1000), (0.001, 1)])
+    assert found.is_stable
+    branch = fl.continuation(rest, "q", (0.1, 0.5))
+    assert set(branch.reasons.values()) == {
+        "q = 0.1 is the end of the range",
+        "q = 0.5 is the end of the range",
+    }
+    one = fl.System(lambda t, h, q=1e-2: [q - np.sqrt(h[0])], n=1)
+    branch = fl.continuation(fl.equilibrium(one, [1.1e-4]), "q", (1e-3, 5e-2))
+    assert all(abs(point.state.y[0] - point.params["q"] ** 2) < 1e-12 for point in branch.points)

@@ -222,3 +222,11 @@ def test_mistakes_are_named(pseudo_saddle: fl.Equilibrium) -> None:
     saddle = fl.System(lambda t, x: [x[0], -x[1]], n=2, resets=floor)
     with pytest.raises(fl.InputError, match="resets, which cannot be undone"):
         fl.manifold(fl.equilibrium(saddle, [0.0, 0.0]), "stable")
+
+
+def test_wrong_sides_are_named() -> None:
+    duffing = fl.System(lambda t, x: [x[1], x[0] - x[0] ** 3], n=2)
+    for sides in (2, "ab", [0], []):
+        with pytest.raises(fl.InputError, match="sides: 1, -1 or both are needed"):
+            fl.manifold(fl.equilibrium(duffing, [0.0, 0.0]), length=1.0, sides=sides)
+    assert len(fl.manifold(fl.equilibrium(duffing, [0.0, 0.0]), length=1.0, sides=1)) == 1

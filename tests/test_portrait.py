@@ -197,3 +197,12 @@ def test_a_field_that_is_not_finite_in_a_part_of_the_window() -> None:
     (first, *_) = (parts for parts in found.surfaces if parts.name == "x[1]")
     kinds = np.concatenate(first.kinds)[np.concatenate(first.sheets, axis=1)[0] < -0.1]
     assert set(kinds.tolist()) == {"inactive"}
+
+
+def test_wrong_starts_and_cycles_of_a_portrait_are_named() -> None:
+    saddle = fl.System(lambda t, x: [x[0], -x[1]], n=2)
+    with pytest.raises(fl.InputError, match=r"starts: an array of shape \(k, 2\) is needed"):
+        phase_portrait(saddle, [(-1, 1), (-1, 1)], starts=[[1, 2, 3]])
+    with pytest.raises(fl.InputError, match="cycles: each is a Cycle"):
+        phase_portrait(saddle, [(-1, 1), (-1, 1)], starts=0, cycles=[3])
+    assert phase_portrait(saddle, [(-1, 1), (-1, 1)], starts=[]).trajectories == []

@@ -17,7 +17,7 @@ __all__ = ["beyond_boundary"]
 
 
 def beyond_boundary(
-    state: Equilibrium, surface: int, name: str, bounds: tuple[float, float] = (-np.inf, np.inf)
+    state: Equilibrium, surface: int, name: str, size: float, bounds: tuple[float, float] = (-np.inf, np.inf)
 ) -> tuple[Equilibrium, float] | None:
     """Return the equilibrium that continues in another mode from a boundary, and its direction there.
 
@@ -29,13 +29,14 @@ def beyond_boundary(
         The surface that it meets; or, if it is on that, the one whose multiplier is -1 or 1.
     name : str
         The parameter.
+    size : float
+        The size by which it is measured.
     bounds : (float, float), optional
         Its range.
     """
     curve = state._curve
     before = curve.mode[surface]
     value = state.params[name]
-    size = abs(value) or 1.0
     if before == 0:
         end = int(np.sign(state.multipliers[curve.sliding.index(surface)]))
         targets: list[tuple[tuple[int, ...], float | None]] = [(_with_entry(curve.mode, surface, end), None)]
@@ -46,10 +47,13 @@ def beyond_boundary(
         ]
     for mode, multiplier in targets:
         other = EquilibriumCurve(curve.motions, mode, (name,), (size,))
+        other.sizes_of_states = curve.sizes_of_states
         own = dict(zip(curve.sliding, state.multipliers, strict=True))
         if multiplier is not None:
             own[surface] = multiplier
         w = np.concatenate([state.y, [own[j] for j in other.sliding], [value]])
+        if multiplier is not None and other.has_kink(surface, w):
+            continue
         try:
             point = corrected(other, w, other.scales(w), np.eye(len(w))[-1])
         except ModelError:

@@ -389,12 +389,11 @@ class _Proof:
     def _look_around(self, w: Array, width: Array) -> None:
         """Prove that there is one zero near a point, in a box that may go beyond the one looked at."""
         for _ in range(6):
-            values, below, above = self._bounds.over(w, w, self._p)
-            rows = self._rows
+            values, below, above = (found[self._rows] for found in self._bounds.over(w, w, self._p))
+            if not (np.isfinite(below).all() and np.isfinite(above).all()):
+                return
             try:
-                change = np.linalg.solve(
-                    0.5 * (below + above)[rows], -0.5 * (values[rows, 0] + values[rows, 1])
-                )
+                change = np.linalg.solve(0.5 * (below + above), -0.5 * (values[:, 0] + values[:, 1]))
             except np.linalg.LinAlgError:
                 return
             if not np.all(np.abs(change) <= 4.0 * width):

@@ -372,7 +372,9 @@ class _CurveSide:
             if not is_degenerate and code not in _PROBES and not _is_unit(code, state):
                 continue
             self.special.append(special)
-            if is_degenerate or code in _PROBES:
+            # Behind a point of Bogdanov and Takens both eigenvalues are real.
+            is_neutral = self.code == "HB" and not _is_unit("HB", self.extended.curve.state(point.w, 0.0))
+            if is_degenerate or code in _PROBES or is_neutral:
                 self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 self.w = there.w
                 self._keep(there)
@@ -435,5 +437,7 @@ def _is_unit(code: str, state: Any) -> bool:
         values = state.nontrivial
         return bool(np.any((np.abs(np.abs(values) - 1) < 1e-4) & (np.abs(values.imag) > 1e-6)))
     if code == "HB":
-        return bool(np.any((np.abs(state.eigenvalues.real) < 1e-4) & (np.abs(state.eigenvalues.imag) > 1e-6)))
+        values = state.eigenvalues
+        size = np.max(np.abs(values))
+        return bool(np.any((np.abs(values.real) < 1e-4 * size) & (np.abs(values.imag) > 1e-6 * size)))
     return True

@@ -56,6 +56,8 @@ _CRITICAL = 1e-3
 _SAVED_EVERY = 50
 # So many points of a cycle are looked at to see whether a state is on it.
 _PHASES = 40
+# An eigenvalue is real if its imaginary part is that part of the largest one, or less.
+_REAL = 1e-6
 # Their test functions change signs with the direction.
 _TURNING = ("LP", "PSN", "BP")
 
@@ -102,7 +104,7 @@ def continuation(
         With one parameter a special point is where the other branch through it starts: cycles of twice the
         period at PD, the other equilibria at BE, cycles at HB. With two parameters the curve goes through it.
     parameter : str, or pair of str
-        What varies.
+        What varies. A curve in two parameters has no `monitor`, `detect`, `switch` and `store`.
     bounds : (float, float), or dict
         The range; with two parameters a dict of the ranges by their names.
     step : float, optional
@@ -145,8 +147,13 @@ def continuation(
     if not isinstance(parameter, str):
         if not isinstance(parameter, Sequence) or not all(isinstance(name, str) for name in parameter):
             raise InputError(f"parameter: a name or a pair of names is needed, not {parameter!r}")
+        given = {"monitor": monitor, "store": store, "detect": detect, "switch": switch}
+        for name, value in given.items():
+            if value is not None and value not in ("all", "follow"):
+                raise InputError(f"{name}: a curve in two parameters has none")
         from filippov.cycles.curves import curve_in_two
 
+        max_points = count("max_points", max_points)
         return curve_in_two(start, tuple(parameter), bounds, step, max_points, progress)
     first: Any = start
     if isinstance(start, Special):
@@ -268,8 +275,11 @@ def curve_of(state: State, names: tuple[str, ...], sizes: tuple[float, ...]) -> 
         curve = CycleCurve(state, names, sizes)
         return curve, curve.start
     own = EquilibriumCurve(state._curve.motions, state._curve.mode, names, sizes)
-    w = state._w[: own.n_unknowns]
-    return own, np.append(w, [state.params[name] for name in names])
+    w = np.append(state._w[: own.n_unknowns], [state.params[name] for name in names])
+    own.sizes_of_states = state._curve.sizes_of_states
+    if not np.any(own.sizes_of_states):
+        own.measure_states(w)
+    return own, w
 
 
 def at_value(state: State, name: str, value: float, most_halvings: int = 5) -> State:
@@ -653,7 +663,8 @@ class _Side:
         following: tuple[State, float] | None = None
         if isinstance(curve, EquilibriumCurve):
             here = curve.state(located.w, located.error)
-            following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
+            size, bounds = self.settings.size, self.settings.bounds
+            following = beyond_boundary(here, key[1], self.settings.name, size, bounds)
         else:
             new = beyond_change(curve, located, beyond)
             following = back_from_change(curve, key, located) if new is None else (new, direction)
@@ -865,8 +876,9 @@ def _is_real(key: Any, state: State) -> bool:
     if code == "HB":
         assert isinstance(state, Equilibrium)
         values = state.eigenvalues
-        critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
-        return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
+        size = np.max(np.abs(values))
+        pairs = values[np.abs(values.imag) > _REAL * size]
+        return bool(np.min(np.abs(pairs.real), initial=np.inf) < 1e-5 * size)
     if not isinstance(state, Cycle):
         return True
     values = state.nontrivial

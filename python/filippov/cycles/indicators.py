@@ -68,7 +68,10 @@ def _of_equilibrium(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
     for place, j in enumerate(curve.sliding):
         multiplier = w[curve.n + place]
         found["BE", j, 1], found["BE", j, -1] = float(1.0 - multiplier), float(1.0 + multiplier)
-    values = np.linalg.eigvals(curve.linearisation(w))
+    try:
+        values = np.linalg.eigvals(curve.linearisation(w))
+    except np.linalg.LinAlgError:  # no motion on its surfaces, or no derivatives
+        return found
     found["PSN" if curve.sliding else "LP",] = float(np.prod(values).real)
     pairs = [values[i] + values[j] for i in range(len(values)) for j in range(i)]
     if pairs:

@@ -10,7 +10,7 @@ Kostelich, Yorke, Int. J. Bifurcation and Chaos 1 (1991) 605 (images of a segmen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -116,7 +116,7 @@ def manifold(
     """
     if which not in ("unstable", "stable"):
         raise InputError(f'which: "unstable" or "stable", not {which!r}')
-    chosen = [int(side) for side in sides]
+    chosen = [*sides] if isinstance(sides, Iterable) else [sides]
     if not chosen or any(side not in (1, -1) for side in chosen):
         raise InputError(f"sides: 1, -1 or both are needed, not {sides!r}")
     with share_bar(progress, f"{which} manifold") as show:

@@ -179,6 +179,8 @@ def phase_portrait(
     window = finite_array([list(pair) for pair in box], "box")
     if window.shape != (2, 2) or not (window[:, 0] < window[:, 1]).all():
         raise InputError("box: two intervals (low, high) with low < high are needed, one for each state")
+    if not all(isinstance(cycle, Cycle) for cycle in cycles):
+        raise InputError("cycles: each is a Cycle, as of fl.limit_cycle")
     motions = Motions(system, 2, system.parameter_values(params), (), {})
     if depends_on_time(motions, 1.0):
         raise InputError("system: it depends on the time; a portrait is of one that does not")
@@ -371,7 +373,10 @@ class _Plane:
         if isinstance(starts, (int, np.integer)) and not isinstance(starts, bool):
             places = self.window[:, 0] + self.size * _even(int(starts))
         else:
-            places = finite_array(starts, "starts").reshape(-1, 2)
+            given = finite_array(starts, "starts")
+            places = np.atleast_2d(given) if given.size else np.zeros((0, 2))
+            if places.ndim != 2 or places.shape[1] != 2:
+                raise InputError(f"starts: an array of shape (k, 2) is needed, not {places.shape}")
         if duration is None:
             duration = _CROSSINGS * self.crossing_time()
         elif not (np.isfinite(duration) and duration > 0):

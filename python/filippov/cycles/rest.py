@@ -17,18 +17,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import TracedSystem
+from filippov._core import ModeBounds, TracedSystem
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
 from filippov.options import check_y0
+from filippov.prepare import parameter_vector
 from filippov.system import System
 
 __all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "first_multipliers", "rest_of"]
 
 _MOST_STEPS = 50
 _TOLERANCE = 1e-13
+# Equations of a larger condition say nothing about how far states move with parameters.
+_REGULAR = 1e8
+# A jump of the field is none below this part of its changes over the size of the states.
+_NO_JUMP = 1e-9
+# By this states are measured that are zero.
+_SMALL = 1e-3
 
 
 class Equilibrium:
@@ -145,9 +152,16 @@ class EquilibriumCurve:
         for corner in corners:
             signs[list(self.sliding)] = corner
             self._corners.append((np.array(corner), signs.copy()))
+        self._active = self._core.active(np.array(self.mode, dtype=np.float64))
+        self._bounds: tuple[TracedSystem, ModeBounds | None] | None = None
+        # The sizes of the states along a branch; 0 where none is known.
+        self.sizes_of_states = np.zeros(self.n)
+
+    @property
+    def _core(self) -> TracedSystem:
         core = self.motions.prepared.core
         assert isinstance(core, TracedSystem)
-        self._active = core.active(np.array(self.mode, dtype=np.float64))
+        return core
 
     @property
     def n_unknowns(self) -> int:
@@ -174,13 +188,30 @@ class EquilibriumCurve:
 
     def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
         """Return the equations and their derivatives."""
-        return self.residual(w), differences(self.residual, w, self.scales(w))
+        k = self.n_unknowns
+        by_unknowns = self._by_unknowns(w)
+        by_parameters = differences(lambda p: self.residual(np.append(w[:k], p)), w[k:], self.sizes)
+        return self.residual(w), np.hstack([by_unknowns, by_parameters])
 
     def scales(self, w: Array) -> Array:
         """Return the sizes by which states, multipliers and parameters are measured."""
-        size = np.abs(w[: self.n])
-        size = np.maximum(size, max(0.1 * float(np.max(size, initial=0.0)), 1e-3))
+        size, known = np.abs(w[: self.n]), self.sizes_of_states
+        least = max(0.1 * float(np.max(size, initial=0.0)), _SMALL)
+        size = np.maximum(size, np.where(known > 0, known, least))
         return np.concatenate([size, np.ones(len(self.sliding)), self.sizes])
+
+    def measure_states(self, w: Array) -> None:
+        """Take the sizes of the states along a branch from those at a point, and from how far they move."""
+        _, jacobian = self.equations(w)
+        k = self.n_unknowns
+        scaled = jacobian[:, :k] * self.scales(w)[:k]
+        moves = np.zeros(self.n)
+        if np.isfinite(jacobian).all() and np.linalg.cond(scaled) < _REGULAR:
+            per_size = np.linalg.solve(jacobian[:, :k], jacobian[:, k:] * self.sizes)
+            moves = np.max(np.abs(per_size[: self.n]), axis=1, initial=0.0)
+        found = np.maximum(np.abs(w[: self.n]), 0.1 * moves)
+        # States that rest at zero have no size of their own.
+        self.sizes_of_states = np.where(found > self.motions.negligible, found, _SMALL)
 
     def switching(self, w: Array) -> Array:
         """Return the functions of the surfaces not slid on, in the sense of the mode."""
@@ -189,6 +220,12 @@ class EquilibriumCurve:
         h = self.motions.right_hand_side(0.0, w[: self.n], signs)[self.n :]
         kept = [j for j, entry in enumerate(self.mode) if entry != 0 and self._active[j]]
         return np.array([h[j] * self.mode[j] for j in kept])
+
+    def has_kink(self, surface: int, w: Array) -> bool:
+        """Whether the field does not jump at one of the surfaces slid on: its multiplier does nothing."""
+        scaled = np.abs(self._by_unknowns(w)[: self.n] * self.scales(w)[: self.n_unknowns])
+        column = scaled[:, self.n + self.sliding.index(surface)]
+        return bool(np.max(column) <= _NO_JUMP * np.max(scaled))
 
     def surfaces_beside(self) -> list[int]:
         """Return the surfaces that `switching` is about."""
@@ -220,13 +257,31 @@ class EquilibriumCurve:
         return np.asarray(jacobian[self.n :, : self.n] @ jacobian[: self.n, self.n :])
 
     def _by_unknowns(self, w: Array) -> Array:
+        """Return the derivatives by states and multipliers, (n + m, n + m), exact if the graph has them."""
+        self.use(w)
         k = self.n_unknowns
-        own = w[:k]
+        own = np.ascontiguousarray(w[:k])
+        bounds = self._bounds_of_mode()
+        if bounds is not None:
+            # Those over a box of no size are derivatives but for rounding.
+            _, below, above = bounds.over(own, own, parameter_vector(self.motions.params))
+            rows = [*range(self.n), *(self.n + j for j in self.sliding)]
+            if np.isfinite(below[rows]).all() and np.isfinite(above[rows]).all():
+                return np.asarray(0.5 * (below[rows] + above[rows]))
 
         def residual(v: Array) -> Array:
             return self.residual(np.append(v, w[k:]))
 
         return differences(residual, own, self.scales(w)[:k], is_fine=True)
+
+    def _bounds_of_mode(self) -> ModeBounds | None:
+        core = self._core
+        if self._bounds is None or self._bounds[0] is not core:
+            try:
+                self._bounds = core, ModeBounds(core, list(self.mode))
+            except ValueError:
+                self._bounds = core, None
+        return self._bounds[1]
 
     def refer_to(self, w: Array) -> None:
         """Take a point as the latest one; nothing depends on it."""

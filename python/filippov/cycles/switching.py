@@ -43,7 +43,7 @@ def other_branch(special: Special, name: str, size: float) -> State:
     """
     state = special.state
     if special.code == "BE" and isinstance(state, Equilibrium):
-        return _behind_boundary(special, state, name)
+        return _behind_boundary(special, state, name, size)
     if special.code == "HB" and isinstance(state, Equilibrium):
         return _cycle_at_hopf(state, name, size)
     if special.code not in ("PD", "BP"):
@@ -199,8 +199,8 @@ def _symmetric(kernel: Array, curve: CycleCurve) -> Array:
     return np.asarray(found / np.linalg.norm(found))
 
 
-def _behind_boundary(special: Special, state: Equilibrium, name: str) -> State:
-    found = beyond_boundary(state, special.test[1], name)
+def _behind_boundary(special: Special, state: Equilibrium, name: str, size: float) -> State:
+    found = beyond_boundary(state, special.test[1], name, size)
     if found is None:
         raise ModelError(f"no other equilibrium goes on from {special!r}")
     return found[0]
