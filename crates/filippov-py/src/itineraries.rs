@@ -7,7 +7,7 @@ use filippov::derivative::{Extended, Extension, HeldMotion};
 use filippov::motion::{Guard, RootEnd};
 use filippov::{
     equations, state_after, Dip, Equations, GuardRates, InstantRecord, ItineraryLeg, LegEnd,
-    LegError, Mode, Options, Passage, PiecewiseSystem, Reached, Unknowns,
+    LegError, Mode, Options, Passage, Reached, Unknowns,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -276,12 +276,6 @@ impl HeldMotions {
             places,
         };
         let legs = &itinerary.legs;
-        let fits = !legs.is_empty() && at.durations.len() == legs.len();
-        if !fits || at.starts.len() != legs.len() * self.system()?.n_states() {
-            return Err(PyValueError::new_err(
-                "the unknowns do not fit the itinerary",
-            ));
-        }
         let found = self.with(&[], |system, extended, actions| {
             let of = (system, extended, actions);
             let found = equations(of, &self.options, legs, at, &mut interrupt(py));

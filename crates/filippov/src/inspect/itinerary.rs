@@ -145,15 +145,7 @@ pub fn equations(
     at: Unknowns,
     interrupt: &mut dyn FnMut(Reached) -> bool,
 ) -> Result<Equations, LegError> {
-    let expected = system.n_surfaces();
-    if let Some(leg) = legs.iter().find(|leg| leg.mode.entries().len() != expected) {
-        return Err(Error::WrongCount {
-            name: "mode",
-            found: leg.mode.entries().len(),
-            expected,
-        }
-        .into());
-    }
+    check(system, actions, legs, at)?;
     let impacts = extended.impacts();
     let motion = |leg: &ItineraryLeg, q: &[f64]| {
         HeldMotion::new((system, extended), &impacts, options, &leg.mode, q)
@@ -185,14 +177,9 @@ pub fn equations(
         if at.places > 0 && !goes_on(&legs[i]) {
             let next = (i + 1) % legs.len();
             let before = rates(&mut motions[i], passage.t, &passage.leg.x)?;
-            let behind = match passage.q == legs[next].q {
-                true => rates(&mut motions[next], passage.t, &passage.after)?,
-                false => rates(
-                    &mut motion(&legs[next], &passage.q),
-                    passage.t,
-                    &passage.after,
-                )?,
-            };
+            let mut other = (passage.q != legs[next].q).then(|| motion(&legs[next], &passage.q));
+            let following = other.as_mut().unwrap_or(&mut motions[next]);
+            let behind = rates(following, passage.t, &passage.after)?;
             passage.sides = Some([before, behind]);
         }
         t = passage.t;
@@ -208,6 +195,35 @@ pub fn equations(
             .collect(),
         passages,
     })
+}
+
+fn check(
+    system: &TracedSystem,
+    actions: &Actions,
+    legs: &[ItineraryLeg],
+    at: Unknowns,
+) -> Result<(), Error> {
+    let wrong = |name, found, expected| Error::WrongCount {
+        name,
+        found,
+        expected,
+    };
+    let (m, n) = (legs.len(), system.n_states());
+    if m == 0 || at.durations.len() != m {
+        return Err(wrong("durations", at.durations.len(), m));
+    }
+    if at.starts.len() != m * n {
+        return Err(wrong("starts", at.starts.len(), m * n));
+    }
+    let mut modes = legs.iter().map(|leg| leg.mode.entries().len());
+    if let Some(found) = modes.find(|found| *found != system.n_surfaces()) {
+        return Err(wrong("mode", found, system.n_surfaces()));
+    }
+    let acts = legs.iter().flat_map(|leg| &leg.acts);
+    match acts.copied().find(|act| *act >= actions.list.len()) {
+        Some(act) => Err(wrong("actions", actions.list.len(), act + 1)),
+        None => Ok(()),
+    }
 }
 
 /// Follows a leg, and does what happens at its end.
@@ -270,8 +286,7 @@ fn pass(
 
 /// The guards of a motion at a place, and their derivatives along it.
 fn rates(motion: &mut HeldMotion, t: f64, x: &[f64]) -> Result<GuardRates, FieldError> {
-    let mut velocity = motion.velocity(t, x)?;
-    velocity.truncate(x.len());
+    let velocity = motion.velocity(t, x)?;
     let found = motion.guards_at(t, x)?.into_iter();
     let rate = |gradient: &Gradient| gradient.time + dot(&gradient.state, &velocity);
     Ok(found
@@ -308,11 +323,8 @@ fn combined(weights: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
 }
 
 /// The derivatives of a function of the end of a motion, by the states and the time at its start, its duration and the parameters.
-///
-/// # Arguments
-/// * `row` - the derivatives of the function by the time, the states and the parameters
-/// * `end` - those of the states at the end
-pub fn along(row: &[f64], end: &[Vec<f64>]) -> Vec<f64> {
+/// `row` has its derivatives by the time, the states and the parameters at the end, `end` those of the states there.
+fn along(row: &[f64], end: &[Vec<f64>]) -> Vec<f64> {
     let n = end.len();
     let mut found = combined(&row[1..=n], end);
     let own = [row[0], row[0]]
@@ -357,10 +369,10 @@ fn assemble(
             }
         }
         if let LegEnd::Cut(share) = legs[i].end {
-            residual[last] = at.durations[i] - share * at.durations[i + 1];
+            residual[last] = at.durations[i] - share * at.durations[next];
             let own = &mut jacobian[last * width..][..width];
             own.fill(0.0);
-            (own[duration], own[duration + 1]) = (1.0, -share);
+            (own[duration], own[m * n + next]) = (1.0, -share);
         }
     }
     (residual, jacobian)

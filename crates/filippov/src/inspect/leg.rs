@@ -111,13 +111,11 @@ pub fn leg(
     let last = values.len() - rows * (n + extended.n_parameters());
     let columns = values[last..].chunks_exact(rows);
     let derivative: Vec<f64> = columns.flat_map(|column| &column[..n]).copied().collect();
-    let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
-        let mut all = motion.velocity(t, x)?;
-        all.truncate(n);
-        Ok(all)
-    };
     let x = solution.last_state().to_vec();
-    let velocities = [velocity(span.0, start)?, velocity(solution.t_last, &x)?];
+    let velocities = [
+        motion.velocity(span.0, start)?,
+        motion.velocity(solution.t_last, &x)?,
+    ];
     let mut samples = Vec::new();
     let mut point = vec![0.0; n];
     for pair in solution.t.windows(2).filter(|_| places > 0) {
