@@ -430,3 +430,19 @@ def test_wrong_guesses_of_cycles() -> None:
     sampled = fl.Reset(period=0.5, map=lambda t, x: [0.5 * np.sign(x[0] + t)])
     with pytest.raises(fl.InputError, match="system: the map of the reset 'reset' is not traced"):
         fl.limit_cycle(fl.System(lambda t, x: [-x[0]], n=1, resets=sampled), [1.0])
+
+
+def test_a_clock_beside_another_forcing() -> None:
+    beating = fl.System(
+        lambda t, x, T=2.0, A=0.5: [-x[0] + np.where(t % T < 0.5 * T, 1.0, -1.0) + A * np.sin(np.pi * t)], n=1
+    )
+    cycle = fl.limit_cycle(beating, [0.0])
+    assert abs(cycle.period - 2) < 1e-12
+    d = 1e-5
+    above, below = (fl.limit_cycle(beating, [0.0], {"A": 0.5 + move}).y0[0] for move in (d, -d))
+    assert abs(cycle.derivative("A").y0[0] - (above - below) / (2 * d)) < 1e-9
+    # With another T there is no common period.
+    with pytest.raises(fl.ModelError, match="what else acts does not repeat itself"):
+        cycle.derivative("T")
+    with pytest.raises(fl.ModelError, match="what else acts does not repeat itself"):
+        fl.continuation(cycle, "T", (1.5, 2.5))

@@ -244,11 +244,16 @@ class TickedPeriod(InferredPeriod):
             raise ModelError(
                 f"clocks do not tick as often as every {guess:.6g} units of time: {_GIVE_PERIOD}"
             )
-        return ticks * max(1, round(guess / ticks))
+        period = ticks * max(1, round(guess / ticks))
+        if not _repeats(motions, period):
+            raise ModelError(
+                f"clocks tick every {ticks:.6g} units of time, and what else acts does not repeat itself"
+            )
+        return period
 
     def _confirms(self, motions: Motions, period: float) -> bool:
         try:
-            return abs(self._find(motions, period) - period) < 1e-9 * period and _repeats(motions, period)
+            return abs(self._find(motions, period) - period) < 1e-9 * period
         except ModelError:
             return False
 
