@@ -20,7 +20,8 @@ fn relay(a: f64) -> TracedSystem {
         states: Vec::new(),
         parameters: vec!["a".into()],
     };
-    TracedSystem::new(graph, field, vec![a], names, Backend::Interpreter).unwrap()
+    TracedSystem::new(graph, field, vec![a], names, Backend::Interpreter)
+        .expect("the graph is complete")
 }
 
 fn leg(side: i8) -> ItineraryLeg {
@@ -34,8 +35,10 @@ fn leg(side: i8) -> ItineraryLeg {
 
 fn found(legs: &[ItineraryLeg], starts: &[f64], durations: &[f64]) -> Result<Equations, LegError> {
     let (system, none) = (relay(2.0), Actions::none());
-    let extension = Extension::new(&system, &Rules::default(), &[0]).unwrap();
-    let extended = extension.at(system.parameters(), &none).unwrap().unwrap();
+    let extension =
+        Extension::new(&system, &Rules::default(), &[0]).expect("the graph has derivatives");
+    let extended = extension.at(system.parameters(), &none);
+    let extended = extended.expect("it compiles").expect("no map is called");
     let at = Unknowns {
         starts,
         durations,
@@ -49,7 +52,8 @@ fn found(legs: &[ItineraryLeg], starts: &[f64], durations: &[f64]) -> Result<Equ
 
 #[test]
 fn the_legs_of_a_relay_close() {
-    let found = found(&[leg(1), leg(-1)], &[0.0, 3.0, 0.0, -3.0], &[3.0, 3.0]).unwrap();
+    let found = found(&[leg(1), leg(-1)], &[0.0, 3.0, 0.0, -3.0], &[3.0, 3.0]);
+    let found = found.expect("the legs can be followed");
     assert!(found.residual.iter().all(|entry| entry.abs() < 1e-12));
     // Behind the switch. The period is 4 w / a: a start that is slower by d comes back 2 d earlier, and is at x = 6 d then, slower
     // by 5 d. Areas are kept, and every orbit is closed.
@@ -71,7 +75,10 @@ fn the_legs_of_a_relay_close() {
         }
     }
     // Each side of a leg knows the rates of the guard: -w before the end, and w behind it.
-    let [before, behind] = found.passages[0].sides.as_ref().unwrap();
+    let [before, behind] = found.passages[0]
+        .sides
+        .as_ref()
+        .expect("they are asked for");
     assert!((before.1[0] + 3.0).abs() < 1e-12 && (behind.1[0] - 3.0).abs() < 1e-12);
 }
 
