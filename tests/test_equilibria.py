@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -204,3 +205,13 @@ def test_eigenvalues_beside_the_end_of_a_domain() -> None:
     one = fl.System(lambda t, h, q=1e-2: [q - np.sqrt(h[0])], n=1)
     branch = fl.continuation(fl.equilibrium(one, [1.1e-4]), "q", (1e-3, 5e-2))
     assert all(abs(point.state.y[0] - point.params["q"] ** 2) < 1e-12 for point in branch.points)
+
+
+def test_equilibria_and_their_branches_can_be_pickled() -> None:
+    relaxing = fl.System(lambda t, x, a=0.5: [a - 2 * x[0]], n=1)
+    rest = fl.equilibrium(relaxing, [0.2])
+    branch = fl.continuation(rest, "a", (0, 1))
+    again, points = pickle.loads(pickle.dumps((rest, branch.points)))
+    assert again.y == rest.y
+    assert again.eigenvalues == -2.0
+    assert [point.state.y for point in points] == [point.state.y for point in branch.points]

@@ -141,30 +141,41 @@ pub fn instant_row<'py>(py: Python<'py>, record: &InstantRecord) -> InstantRow<'
     )
 }
 
-/// A leg: its mode, the discrete states, what ends it, the actions done there, how many times as long it lasts as the next one that
-/// goes on with it, and the time of its end. A guard ends it, or a share, or a time; NaN and `None` are no such things.
+/// A leg. What ends it is a guard, or that it has its share of a motion, or a known time; where all three are missing, nothing does.
 type LegRow = (
+    // Its mode.
     Vec<i8>,
+    // The discrete states.
     Vec<f64>,
+    // The guard that ends it.
     Option<(String, isize, i8)>,
+    // The actions that are done at its end.
     Vec<usize>,
+    // How many times as long as the next leg it lasts, if that goes on with it; else NaN.
     f64,
+    // The time of its end, if that is known; else NaN.
     f64,
 );
 
-/// What happens to the legs, in the place of each: the time of its end, the state there, the columns of its derivative by that at the
-/// start, the velocities at both ends, the derivatives of the equation of its end by the time, the states and the parameters (NaN: nothing ends
-/// it), the state behind it, the derivatives of that (or none), the discrete states behind it, and the values and rates of the
-/// guards before and behind it (none: they are not known).
+/// The legs with what happens at their ends. Each list or array has one entry per leg.
 type PassageRows<'py> = (
+    // The times of the ends.
     Vec<f64>,
+    // The states there.
     Rows<'py>,
+    // The columns of their derivatives by the states at the starts.
     Cube<'py>,
+    // The velocities at both ends.
     Cube<'py>,
+    // The derivatives of the equations of the ends by the time, the states and the parameters; NaN if nothing ends a leg.
     Rows<'py>,
+    // The states behind the ends.
     Rows<'py>,
+    // The derivatives of these by the time, the states before and the parameters, where an action changes the state.
     Vec<Option<Rows<'py>>>,
+    // The discrete states behind the ends.
     Vec<Vec<f64>>,
+    // The values and rates of the guards before the ends and behind them, if they were asked for.
     Vec<Option<[GuardRates; 2]>>,
 );
 

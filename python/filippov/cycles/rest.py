@@ -157,6 +157,9 @@ class EquilibriumCurve:
         # The sizes of the states along a branch; 0 where none is known.
         self.sizes_of_states = np.zeros(self.n)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_bounds": None}
+
     @property
     def _core(self) -> TracedSystem:
         core = self.motions.prepared.core
