@@ -295,6 +295,17 @@ impl Graph {
         }
     }
 
+    /// The surface whose function an expression is a multiple of, and the sign of the factor, if there is one.
+    pub fn surface_of(&self, id: NodeId) -> Option<(u32, f64)> {
+        let form = LinearForm::of(self, id);
+        let (key, lead) = form.key()?;
+        let (index, side) = self.surfaces.switch_of_form(&key)?;
+        let function = LinearForm::of(self, self.surface(index));
+        // A known form may be what is left of a surface without its powers.
+        let is_multiple = function.key().is_some_and(|(own, _)| own.matches(&key));
+        is_multiple.then_some((index, side * lead))
+    }
+
     /// Makes a surface known to [`Graph::switch`]; of several in one place the first is kept.
     pub(crate) fn register_surface(&mut self, index: u32) {
         let function = self.surface(index);

@@ -174,6 +174,8 @@ impl UserFunction for CalledEvent {
 /// and the expression itself.
 pub struct EventExpression {
     parts: Vec<EventPart>,
+    /// The surface whose function it is a multiple of, and the sign of the factor.
+    multiple_of: Option<(u32, f64)>,
     /// The surfaces of the graph that the inner parts are.
     surfaces: Vec<usize>,
     /// How many signs the programs read at most.
@@ -220,6 +222,7 @@ impl EventExpression {
         let parts = nodes.iter().map(|&node| EventPart::compile(graph, node));
         Ok(EventExpression {
             parts: parts.collect::<Result<_, _>>()?,
+            multiple_of: graph.surface_of(node),
             surfaces,
             n_signs: graph.n_surfaces(),
             levels: levels
@@ -445,6 +448,12 @@ impl UserFunction for CompiledEvent {
 
     fn parts(&self) -> Option<&dyn SmoothParts> {
         Some(self)
+    }
+
+    fn surface(&self) -> Option<(usize, f64)> {
+        let (index, sense) = self.expression.multiple_of?;
+        let index = index as usize;
+        (index < self.system.n_surfaces()).then_some((index, sense))
     }
 }
 

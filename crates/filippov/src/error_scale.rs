@@ -1,4 +1,6 @@
-//! The tolerances of a run as the weights of an error.
+//! The tolerances of a run: the weights of an error, and the sizes of the states.
+
+use crate::options::Options;
 
 /// The weights of the error norm: atol_i + rtol max(|y0_i|, |y1_i|). A component that is zero at both ends and has no
 /// absolute tolerance does not count: nothing tells its size.
@@ -69,6 +71,100 @@ impl ErrorScale {
     pub fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
         root_mean_square(v.len(), |i| v[i] / self.of(i, y[i], y[i]))
     }
+}
+
+/// What is near, in a system whose states differ in size. The absolute tolerances tell how the sizes compare, and the state itself how
+/// large they are. The unit of time is that in which a state changes by its size.
+#[derive(Clone, Copy, Debug)]
+pub struct Units<'a> {
+    atol: &'a [f64],
+    /// Where the absolute tolerance governs the error, for the largest one.
+    floor: f64,
+    /// The state.
+    x: &'a [f64],
+    /// The size of a state that is zero, for the largest absolute tolerance.
+    least: f64,
+    /// How many sizes a state changes by in a unit of the user's time; zero if it is not known.
+    pace: f64,
+}
+
+impl<'a> From<&'a Options> for Units<'a> {
+    fn from(options: &'a Options) -> Self {
+        let floor = largest_of(&options.atol) / options.rtol;
+        Units {
+            atol: &options.atol,
+            floor,
+            least: if floor > 0.0 { floor } else { 1.0 },
+            ..Units::ONES
+        }
+    }
+}
+
+impl<'a> Units<'a> {
+    /// Those of a system whose states and times are about 1.
+    pub const ONES: Units<'static> = Units {
+        atol: &[],
+        floor: 1.0,
+        x: &[],
+        least: 1.0,
+        pace: 0.0,
+    };
+
+    /// Those at a point: a state that is zero has the size of the smallest one there that is not, in comparison.
+    #[must_use]
+    pub fn at<'s>(self, x: &'s [f64]) -> Units<'s>
+    where
+        'a: 's,
+    {
+        let sizes = x.iter().enumerate().map(|(i, x)| x.abs() / self.part(i));
+        let known = sizes.filter(|size| *size > self.floor);
+        let least = known.fold(f64::INFINITY, f64::min);
+        Units {
+            x,
+            least: if least.is_finite() { least } else { self.least },
+            ..self
+        }
+    }
+
+    /// With the pace of a motion in these sizes.
+    #[must_use]
+    pub fn with_pace(self, pace: f64) -> Self {
+        Units { pace, ..self }
+    }
+
+    /// The size of state `i`.
+    pub fn of_state(&self, i: usize) -> f64 {
+        self.x.get(i).map_or(0.0, |x| x.abs()) + self.least * self.part(i)
+    }
+
+    /// A short time at `t`.
+    pub fn of_time(&self, t: f64) -> f64 {
+        if self.pace > 0.0 && self.pace.is_finite() {
+            1.0 / self.pace
+        } else {
+            1.0 + t.abs()
+        }
+    }
+
+    /// The sizes of `n` states as parts of the largest; none if they are the same.
+    pub fn parts(&self, n: usize) -> Vec<f64> {
+        let parts = (0..n).map(|i| self.part(i));
+        match parts.clone().all(|part| part == 1.0) {
+            true => Vec::new(),
+            false => parts.collect(),
+        }
+    }
+
+    fn part(&self, i: usize) -> f64 {
+        match self.atol.get(i) {
+            Some(atol) if *atol > 0.0 && self.atol.len() > 1 => atol / largest_of(self.atol),
+            _ => 1.0,
+        }
+    }
+}
+
+fn largest_of(atol: &[f64]) -> f64 {
+    atol.iter().fold(0.0, |most: f64, atol| most.max(*atol))
 }
 
 #[inline(always)]

@@ -106,6 +106,7 @@ mod vectors;
 
 pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
+pub use error_scale::Units;
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, equations, field_off_surfaces, hidden_dynamics, intersection_field,

@@ -10,7 +10,7 @@ use filippov::switching::{
     is_stable, limit_of_hidden_dynamics, resolve, roots_in_cube, stability_margins, HiddenOutcome,
     Incoming, Matrix, NormalFields, SignGroup, Undecided,
 };
-use filippov::{PiecewiseSystem, Place, Setting, TracedSystem};
+use filippov::{PiecewiseSystem, Place, Setting, TracedSystem, Units};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 use random_fields::Random;
 
@@ -84,7 +84,7 @@ fn only_groups_of_the_sliding_surfaces_count() {
     state[5 + 12] = 0.3;
     let signs = vec![1.0; 12];
     let place = Place::new(0.0, &state, &signs);
-    assert_eq!(fields.evaluate(&system, &place).unwrap(), 5);
+    assert_eq!(fields.evaluate(&system, &place, Units::ONES).unwrap(), 5);
 }
 
 /// A random sum over groups, and the same with all patterns.

@@ -105,7 +105,8 @@ impl Around {
             .collect();
         let surfaces: Vec<usize> = slid.iter().map(|&i| meeting.surfaces[i]).collect();
         let mut fields = MeetingFields::of_all_patterns(at.system, &surfaces);
-        notes.n_field_evaluations += fields.evaluate(at.system, &at.place(&mode.signs()))?;
+        notes.n_field_evaluations +=
+            fields.evaluate(at.system, &at.place(&mode.signs()), at.policy.law.units)?;
         let mut patterns = Vec::with_capacity(1 << slid.len());
         for pattern in 0..1_usize << slid.len() {
             if at.patience.is_over() {

@@ -8,7 +8,7 @@ use super::point::{Notes, Point};
 use crate::cube::Vector;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{shares_of_rows, Projector};
+use crate::motion::shares_of_rows;
 use crate::system::is_zero_within;
 use crate::tolerances::{
     AT_SIDE, BEND_OF_CLINGING, CLOSE_TO_ROOT, HALVINGS_OF_CLINGING, MOST_CLINGING,
@@ -336,7 +336,7 @@ impl Roots<'_, '_, '_> {
     ) -> Result<(Vec<f64>, Vec<f64>), FieldError> {
         let (at, n, mut x) = (&self.at, x.len(), x.to_vec());
         let signs = mode.signs();
-        let mut projector = Projector::new(n, signs.len());
+        let mut projector = at.projector();
         projector.project_onto(at.system, &self.surfaces, t, &mut x, at.setting(&signs))?;
         let (mut rows, mut shifts) = (vec![0.0; n * self.surfaces.len()], Vector::new());
         let held = self.surfaces.iter().zip(distances);

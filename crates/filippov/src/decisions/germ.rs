@@ -58,7 +58,7 @@ impl MotionSeries {
         let (n, width) = (at.x.len(), jets.width());
         let mut rows = vec![0.0; (jets.order() + 1) * width];
         at.system.eval_jets(&jets, &at.place(&signs), &mut rows);
-        let sizes: Vec<f64> = (0..n).map(|i| at.scale.size(i, at.x[i])).collect();
+        let sizes: Vec<f64> = (0..n).map(|i| at.size(i)).collect();
         let of = |i: usize, k: usize| (rows[k * width + i] / sizes[i]).abs();
         let speed = (0..n).map(|i| of(i, 1)).fold(0.0, f64::max);
         let rate = |i: usize| {

@@ -280,7 +280,8 @@ fn drop_other_names(
         velocities.push(at.velocity_from(notes, &next.mode, next.start.as_deref())?);
     }
     let around = meeting.surroundings(at, notes)?;
-    let size = around.map_or(0.0, |around| around.corners.size());
+    let units = at.units();
+    let pace = around.map_or(0.0, |around| around.corners.pace(|i| units.of_state(i)));
     let stays_on = |one: &Viable, j: usize| {
         let mut left = one.next.left.iter();
         one.next.mode.entries()[j] == 0
@@ -293,9 +294,9 @@ fn drop_other_names(
             let differs =
                 |j: &&usize| one.next.mode.entries()[**j] != other.next.mode.entries()[**j];
             let mut differing = meeting.surfaces.iter().filter(differs);
-            let mut pairs = velocities[k].iter().zip(&velocities[known]);
+            let mut pairs = velocities[k].iter().zip(&velocities[known]).enumerate();
             differing.all(|&j| stays_on(one, j) && stays_on(other, j))
-                && pairs.all(|(a, b)| (a - b).abs() <= TANGENT * size)
+                && pairs.all(|(i, (a, b))| (a - b).abs() <= TANGENT * pace * units.of_state(i))
         });
         if !is_named {
             kept.push(k);

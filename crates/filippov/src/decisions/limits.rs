@@ -5,14 +5,13 @@ use super::rule::Meeting;
 use crate::cube::least_multipliers;
 use crate::error::FieldError;
 use crate::error::Undecided;
-use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
-use crate::motion::{ContactField, Motion, Projector};
+use crate::motion::{ContactField, Motion};
 use crate::status::Stop;
 use crate::switch::Kind;
 use crate::switch::Switch;
 use crate::switching::admissible_within;
-use crate::system::dot;
+use crate::system::dot_magnitude;
 use crate::tolerances::{
     ACCUMULATION_AGREEMENT, FAST_SHRINKING, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION,
     ROUNDING, SLOW_SHRINKING, UNRESOLVED_FLIGHT,
@@ -113,9 +112,9 @@ pub(crate) fn limit_of_switches(
     let Some(meeting) = meeting_of(at, &switches[last + 1 - turn..]) else {
         return Ok(None);
     };
-    let mut distances = [0.0; 3];
+    let (mut distances, reach) = ([0.0; 3], Reach::at(at));
     for (found, switch) in distances.iter_mut().zip(&turns[1..]) {
-        *found = distance(at, &meeting, switch)?;
+        *found = reach.distance(at, &meeting, switch)?;
     }
     // Time and distance may shrink by different powers of one ratio, as they do where a field is a root of the distance.
     let [a, b, c] = distances;
@@ -126,7 +125,7 @@ pub(crate) fn limit_of_switches(
     }
     let is_geometric = shrinks_by(ratios).is_some() && is_no_power(ratios, 0.0);
     let limit = is_geometric.then(|| Limit::of(turns, meeting)).flatten();
-    let Some(mut limit) = limit.filter(|limit| c < reach(at.scale, at.x) && limit.t > at.t) else {
+    let Some(mut limit) = limit.filter(|limit| c < 1.0 && limit.t > at.t) else {
         return Ok(None);
     };
     project(at, &mut limit)?;
@@ -237,8 +236,7 @@ pub(crate) fn limits_of_impacts(
     let height = 0.5 * rate.rate * rate.rate / falls.value.abs();
     let size = at.system.surface_size(j, &at.place(&signs))?;
     let is_unresolved = height <= UNRESOLVED_FLIGHT * ROUNDING * size;
-    let distance = rate.rate.abs() / dot(&row, &row).sqrt();
-    if !is_unresolved && distance >= reach(at.scale, at.x) {
+    if !is_unresolved && Reach::at(at).to(rate.rate, &row) >= 1.0 {
         return Ok([None, None]);
     }
     let same = |s: &Switch| {
@@ -288,17 +286,17 @@ pub(crate) fn limit_of_impact_rounds(
         return Ok(None);
     }
     let signs = after.signs();
-    let near = reach(at.scale, at.x);
+    let reach = Reach::at(at);
     let mut h = vec![0.0; at.system.n_surfaces()];
     at.system.surfaces(&at.place(&signs), &mut h)?;
     let mut row = vec![0.0; at.x.len()];
     for &j in &surfaces {
         let rate = at.system.rate_gradient(j, &at.place(&signs), &mut row)?;
-        if rate.rate.abs() / dot(&row, &row).sqrt() >= near {
+        if reach.to(rate.rate, &row) >= 1.0 {
             return Ok(None);
         }
         at.system.gradient(j, &at.place(&signs), &mut row)?;
-        if h[j].abs() / dot(&row, &row).sqrt() >= near {
+        if reach.to(h[j], &row) >= 1.0 {
             return Ok(None);
         }
     }
@@ -333,7 +331,7 @@ fn round_of(switches: &[Switch]) -> Option<usize> {
 
 /// Moves the state of a limit onto its surfaces.
 pub(super) fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
-    let mut projector = Projector::new(limit.x.len(), at.system.n_surfaces());
+    let mut projector = at.projector();
     let setting = at.setting(at.arrival.signs);
     projector.project_onto_rates(at.system, &limit.surfaces, limit.t, &mut limit.x, setting)
 }
@@ -421,7 +419,7 @@ fn stays_tangent(
     let moment = at.moment(notes, &after.signs(), &velocity)?;
     let mut ahead = at.along(&velocity, moment);
     let t = at.t + moment;
-    let mut projector = Projector::new(ahead.len(), at.system.n_surfaces());
+    let mut projector = at.projector();
     projector.project_onto(
         at.system,
         meeting,
@@ -433,22 +431,63 @@ fn stays_tangent(
     Ok(later.telling() == telling)
 }
 
-/// Distance of a switch to the intersection, h_j in units of its gradient, and the same of the rates that vanish there.
-pub(super) fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
-    let (signs, n) = (switch.mode_after.signs(), switch.y_after.len());
-    let mut h = vec![0.0; at.system.n_surfaces()];
-    let mut gradient = vec![0.0; n];
-    let place = at.place_at(switch.t, &switch.y_after, &signs);
-    let mut square = 0.0;
-    for system in [Some(at.system), at.system.reduced(meeting)] {
-        let Some(system) = system else { continue };
-        system.surfaces(&place, &mut h)?;
-        for &j in meeting {
-            system.gradient(j, &place, &mut gradient)?;
-            square += h[j] * h[j] / dot(&gradient, &gradient);
+/// From where a limit is known to the tolerance: its error is a multiple of the square of the distance.
+pub(super) struct Reach {
+    /// The sizes of the states, lately.
+    sizes: Vec<f64>,
+    tolerances: Vec<f64>,
+}
+
+impl Reach {
+    pub fn at(at: &Point) -> Self {
+        let first = at.arrival.switches.len().saturating_sub(LONGEST_TURN);
+        let lately = &at.arrival.switches[first..];
+        let size = |(i, x): (usize, &f64)| {
+            let states = lately.iter().filter_map(|switch| switch.y_after.get(i));
+            let size = states.fold(x.abs(), |most, y| most.max(y.abs()));
+            Some(at.scale.size(i, size)).filter(|size| size.is_finite())
+        };
+        let sizes =
+            at.x.iter()
+                .enumerate()
+                .map(|state| size(state).unwrap_or(0.0));
+        let tolerance = |(i, x): (usize, &f64)| at.scale.tolerance(i, *x, *x);
+        Reach {
+            sizes: sizes.collect(),
+            tolerances: at.x.iter().enumerate().map(tolerance).collect(),
         }
     }
-    Ok(square.sqrt())
+
+    /// How far a function with this value and gradient is from zero: 1 at the border.
+    fn to(&self, value: f64, gradient: &[f64]) -> f64 {
+        let along = |parts: &[f64]| dot_magnitude(gradient, parts);
+        let (size, tolerance) = (along(&self.sizes), along(&self.tolerances));
+        value.abs() / (size * tolerance.max(NEAREST_ACCUMULATION * size)).sqrt()
+    }
+
+    /// How far a switch is from the surfaces that it is said to accumulate at, and from their rates for one of a higher relative
+    /// degree.
+    pub fn distance(
+        &self,
+        at: &Point,
+        meeting: &[usize],
+        switch: &Switch,
+    ) -> Result<f64, FieldError> {
+        let signs = switch.mode_after.signs();
+        let mut h = vec![0.0; at.system.n_surfaces()];
+        let mut gradient = vec![0.0; switch.y_after.len()];
+        let place = at.place_at(switch.t, &switch.y_after, &signs);
+        let mut square = 0.0;
+        for system in [Some(at.system), at.system.reduced(meeting)] {
+            let Some(system) = system else { continue };
+            system.surfaces(&place, &mut h)?;
+            for &j in meeting {
+                system.gradient(j, &place, &mut gradient)?;
+                square += self.to(h[j], &gradient).powi(2);
+            }
+        }
+        Ok(square.sqrt())
+    }
 }
 
 /// Can switches of these surfaces accumulate where all of them meet? At one alone they can if its rate vanishes there too.
@@ -490,7 +529,7 @@ pub(crate) fn passed_beside(
     }
     let met: Vec<usize> = passed.iter().copied().chain([surface]).collect();
     let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
+    let mut projector = at.projector();
     projector.project_onto(at.system, &met, at.t, &mut x, at.setting(&signs))?;
     let h = at.moved(at.t, &x).surface_values(notes, &signs)?;
     Ok(Some(Passed {
@@ -498,16 +537,6 @@ pub(crate) fn passed_beside(
         x,
         h,
     }))
-}
-
-/// From where the limit is known to the tolerance: its error is a multiple of the square of the distance.
-fn reach(scale: &ErrorScale, x: &[f64]) -> f64 {
-    let scales = x.iter().enumerate();
-    let scales = scales.map(|(i, x)| scale.tolerance(i, *x, *x));
-    scales
-        .fold(f64::INFINITY, f64::min)
-        .max(NEAREST_ACCUMULATION)
-        .sqrt()
 }
 
 /// How many switches a turn has, if the last three turns repeat.

@@ -7,7 +7,6 @@ use super::point::{Decided, Left, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::Projector;
 use crate::status::Stop;
 use crate::switching::{decide, Arrival, Decision};
 
@@ -39,7 +38,7 @@ pub(super) fn one_surface(
     }
     // A field that is tangent to the surface: beside it, by rounding, it still points somewhere.
     let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), signs.len());
+    let mut projector = at.projector();
     projector.project(at.system, j, at.t, &mut x, at.setting(signs))?;
     let arrival = arrival.to_tangency(is_rounding);
     let decision = decide(at.system, j, arrival, &at.place_at(at.t, &x, signs))?;

@@ -8,7 +8,7 @@ use super::settle::place_on;
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
-use crate::motion::{ContactField, Projector, SmoothField};
+use crate::motion::{ContactField, SmoothField};
 use crate::status::Stop;
 use crate::system::{dot, surfaces_that_matter, Action};
 use crate::tolerances::{AT_SIDE, ERRORS_OF_STEPS, FRICTION_IN_MAP, MOMENT, ROUNDING, SLOW};
@@ -205,7 +205,7 @@ pub(crate) fn pushed_back(
         return Ok(None);
     }
     let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
+    let mut projector = at.projector();
     projector.project_onto(at.system, &beyond, at.t, &mut x, at.setting(&signs))?;
     Ok(Some(x))
 }

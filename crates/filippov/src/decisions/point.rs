@@ -7,11 +7,11 @@ use smallvec::{smallvec, SmallVec};
 
 use crate::cube::KnownUniqueness;
 use crate::error::FieldError;
-use crate::error_scale::ErrorScale;
+use crate::error_scale::{ErrorScale, Units};
 use crate::mode::{Mode, Signs};
 use crate::motion::Deflation;
 use crate::motion::{ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
-use crate::motion::{Leading, TwoFoldMotion};
+use crate::motion::{Leading, Projector, TwoFoldMotion};
 use crate::options::{NonUnique, Options, SlidingRule};
 use crate::patience::Patience;
 use crate::status::{Stop, Warning};
@@ -142,6 +142,25 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
             actions: self.actions,
             sides: self.arrival.sides,
         }
+    }
+
+    /// The size of component `i` of the state ([`ErrorScale::size`]).
+    pub fn size(&self, i: usize) -> f64 {
+        self.scale.size(i, self.x[i])
+    }
+
+    /// What moves points onto surfaces.
+    pub fn projector(&self) -> Projector {
+        let units = self.policy.law.units.parts(self.x.len());
+        Projector::new(self.x.len(), self.system.n_surfaces()).measured_in(units)
+    }
+
+    /// The sizes of the states, and the time in which one changes by its size along the motion that ends here.
+    pub fn units(&self) -> Units<'_> {
+        let units = self.policy.law.units.at(self.x);
+        let velocity = self.arrival.velocity.iter().enumerate();
+        let paces = velocity.map(|(i, v)| v.abs() / units.of_state(i));
+        units.with_pace(paces.filter(|pace| pace.is_finite()).fold(0.0, f64::max))
     }
 
     /// These signs, with the discrete states.
@@ -282,8 +301,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         signs: &[f64],
         velocity: &[f64],
     ) -> Result<f64, FieldError> {
-        let sizes = self.x.iter().enumerate();
-        let sizes: Values = sizes.map(|(i, x)| self.scale.size(i, *x)).collect();
+        let sizes: Values = (0..self.x.len()).map(|i| self.size(i)).collect();
         let speed = |v: &[f64]| {
             let speeds = v.iter().zip(&sizes);
             speeds
@@ -337,7 +355,11 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         mode: &Mode,
     ) -> Result<MeetingFields, FieldError> {
         let mut corners = MeetingFields::new(self.system, meeting);
-        notes.n_field_evaluations += corners.evaluate(self.system, &self.place(&mode.signs()))?;
+        notes.n_field_evaluations += corners.evaluate(
+            self.system,
+            &self.place(&mode.signs()),
+            self.policy.law.units,
+        )?;
         Ok(corners)
     }
 }

@@ -7,7 +7,7 @@ use super::point::{Decided, Left, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Leading, Level, Projector};
+use crate::motion::{Leading, Level};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::{BothSides, PiecewiseSystem, Place};
 use crate::tolerances::{DOUBTFUL, ERRORS_OF_STEPS, ROUNDING};
@@ -59,7 +59,7 @@ impl<'a> Reduced<'a> {
             crossed: SmallVec::new(),
             orders: vec![0; signs.len()],
         };
-        let mut projector = Projector::new(at.x.len(), signs.len());
+        let mut projector = at.projector();
         let mut h = vec![0.0; signs.len()];
         let mut order = 0;
         let mut levels: SmallVec<[(&dyn PiecewiseSystem, Vec<usize>); 3]> = SmallVec::new();

@@ -5,7 +5,7 @@ use super::point::{Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{shares_of_rows, Projector, SmoothField};
+use crate::motion::{shares_of_rows, SmoothField};
 use crate::status::{Warning, WarningCode};
 use crate::system::{eval_on_side, is_zero_within};
 use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
@@ -34,9 +34,12 @@ pub(super) fn stay_if_nothing_leaves(
     }
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
         let velocity = at.velocity(notes, &stays.mode, &[])?;
-        let size = at.corners(notes, meeting.surfaces, meeting.mode)?.size();
+        let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+        let units = at.units();
+        let pace = corners.pace(|i| units.of_state(i));
         if velocity.iter().all(|v| v.is_finite()) {
-            let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
+            let mut parts = velocity.iter().enumerate();
+            let is_rest = parts.all(|(i, v)| v.abs() <= AT_SIDE * pace * units.of_state(i));
             return Ok(is_rest.then_some(stays));
         }
     }
@@ -78,7 +81,7 @@ pub(crate) fn rest_within_tolerance(
         return Ok(None);
     }
     let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), signs.len());
+    let mut projector = at.projector();
     projector.project_onto_rates(at.system, &surfaces, at.t, &mut x, at.setting(signs))?;
     let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
     let there = at.moved(at.t, &x);

@@ -3,7 +3,7 @@
 //! Where the ratio of successive rounds tends to 1, the rounds have no limit in finite time, and their number grows without bound
 //! (`docs/theory/intersections.md`).
 
-use super::limits::{distance, is_on_all, meeting_of, project, repeats, turn_of, Limit};
+use super::limits::{is_on_all, meeting_of, project, repeats, turn_of, Limit, Reach};
 use super::point::{Notes, Point};
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
@@ -84,7 +84,8 @@ pub(crate) fn mean_of_rounds(at: &Point, notes: &mut Notes) -> Result<Option<Lim
         return Ok(None);
     };
     let [before, now] = [&switches[last - turn], &switches[last]];
-    let ratio = distance(at, &meeting, now)? / distance(at, &meeting, before)?;
+    let reach = Reach::at(at);
+    let ratio = reach.distance(at, &meeting, now)? / reach.distance(at, &meeting, before)?;
     let shrinks_slowly = ratio > STEADY_ROUNDS && ratio < 1.0;
     if !shrinks_slowly {
         return Ok(None);

@@ -6,7 +6,6 @@ use super::surroundings::Surroundings;
 use crate::cube::Lap;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::Projector;
 use crate::tolerances::SPIRAL_START;
 
 /// Where a leap ends.
@@ -62,7 +61,7 @@ pub(crate) fn landing(
     let mut x = at.along(&leap.shift, share);
     let t = at.t + share * leap.duration;
     let signs = leap.region.signs();
-    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
+    let mut projector = at.projector();
     projector.project(at.system, leap.border, t, &mut x, at.setting(&signs))?;
     let left = surfaces_left(
         &at.moved(t, &x),

@@ -7,7 +7,7 @@ use super::point::{Notes, Point, Values};
 use crate::cube::{roots_in_cube, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{are_parallel, beside_on, in_the_place_of, normal};
+use crate::motion::{are_parallel, beside_on, in_the_place_of, normal, parallel, MeetingFields};
 use crate::system::dot;
 use crate::tolerances::{BESIDE, DOUBTFUL, ONE_DIRECTION, ROUNDING};
 
@@ -35,7 +35,7 @@ impl Parallels {
     /// Looks at all pairs.
     pub fn of(at: &Point, meeting: &[usize], mode: &Mode) -> Result<Self, FieldError> {
         let (signs, n) = (mode.signs(), at.x.len() + 1);
-        let place = at.place(&signs);
+        let (place, units) = (at.place(&signs), at.units());
         let mut normals = vec![0.0; n * meeting.len()];
         for (&j, row) in meeting.iter().zip(normals.chunks_exact_mut(n)) {
             row[n - 1] = at.system.gradient(j, &place, &mut row[..n - 1])?;
@@ -64,8 +64,11 @@ impl Parallels {
             if !has_normal(i) || !are_parallel(dot(one, other), squares[i] * squares[k]) {
                 continue;
             }
+            if !parallel(one, other, &place, units) {
+                continue;
+            }
             let (j, others) = (meeting[i], [meeting[k]]);
-            if !in_the_place_of(at.system, &place, j, &others)?.is_empty() {
+            if !in_the_place_of(at.system, (&place, units), j, &others)?.is_empty() {
                 found.coincide = true;
             } else if has_normal(k) {
                 let ratio = dot(one, other) / squares[i];
@@ -137,17 +140,22 @@ pub(super) fn together(
     })
 }
 
-/// Does a velocity in this mode keep a motion on two surfaces that touch, where fields around them have this size?
+/// Does a velocity in this mode keep a motion on two surfaces that touch, where these are the fields around them?
 pub(super) fn keeps_together(
     at: &Point,
     pair: [usize; 2],
     (mode, velocity): (&Mode, &[f64]),
-    size: f64,
+    corners: &MeetingFields,
 ) -> Result<bool, FieldError> {
     let (found, n) = (parting(at, pair, mode)?, velocity.len());
     Ok(found.is_some_and(|(normal, _)| {
         let rate = normal[n] + dot(&normal[..n], velocity);
-        rate.abs() <= DOUBTFUL * size
+        let (units, entries) = (at.units(), normal[..n].iter().enumerate());
+        let size: f64 = entries
+            .map(|(i, entry)| entry.abs() * units.of_state(i))
+            .sum();
+        let pace = corners.pace(|i| units.of_state(i));
+        rate.abs() <= DOUBTFUL * (normal[n].abs() + pace * size)
     }))
 }
 
@@ -167,7 +175,12 @@ fn parting(
     for distance in BESIDE {
         let mut found: Vec<Vec<f64>> = Vec::new();
         for side in [-1.0, 1.0] {
-            let (t, x) = beside_on(at.system, &at.place(&signs), j, side * distance)?;
+            let (t, x) = beside_on(
+                at.system,
+                (&at.place(&signs), at.units()),
+                j,
+                side * distance,
+            )?;
             let (near, far) = (
                 normal(at.system, &at.place_at(t, &x, &signs), j)?,
                 normal(at.system, &at.place_at(t, &x, &signs), k)?,

@@ -55,7 +55,7 @@ pub(super) fn survey(
         Err(Undecided::NotFinite) => return by_trial(at, notes, meeting).map(Some),
         Err(_) => return Ok(None),
     };
-    let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
+    let pace = corners.pace(|i| at.size(i));
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
@@ -159,7 +159,7 @@ pub(super) fn survey(
             let pair = touch.pair.map(|i| meeting.surfaces[i]);
             if pair.contains(&j) && pair.iter().all(|&k| slides.entries()[k] == 0) {
                 let velocity = at.velocity_from(notes, mode, viable.next.start.as_deref())?;
-                is_singular |= keeps_together(at, pair, (mode, &velocity), corners.size())?;
+                is_singular |= keeps_together(at, pair, (mode, &velocity), corners)?;
             }
         }
         if is_singular {

@@ -614,6 +614,7 @@ impl<'w> Walk<'w> {
         let n = extended.n;
         let options = self.run.options;
         let weights = Weights {
+            start: self.run.t_span.0,
             span: self.run.t_span.1 - self.run.t_span.0,
             rtol: options.rtol,
             atol: options.atol.clone(),

@@ -100,7 +100,7 @@ impl<'r> Differentiated<'r> {
             return Ok(None);
         };
         let known = &found.second[index * size..][..size];
-        if found.t[index] == t || known.iter().any(|v| v.is_nan()) {
+        if found.t[index] == t {
             return Ok(Some(known.to_vec()));
         }
         let columns = self.known_columns(index);

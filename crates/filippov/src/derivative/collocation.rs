@@ -131,7 +131,7 @@ impl Collocation {
 
     /// Carries changes on over a part of this length, each of n states with the shares of the parameters behind them.
     pub fn carry(&mut self, nodes: &[Linearisation], dt: f64, columns: &mut [Vec<f64>]) {
-        self.take(nodes, dt, columns);
+        self.take(nodes, dt, Measured::Changes(columns), columns.len());
         if matches!(self.way, Way::Iteration) {
             let found: Option<Vec<Vec<f64>>> =
                 columns.iter().map(|c| self.iterate(nodes, c)).collect();
@@ -163,7 +163,7 @@ impl Collocation {
     /// Takes the gradient of a function by the state at the end of a part back to the start, and adds to the shares of the
     /// parameters.
     pub fn pull_back(&mut self, nodes: &[Linearisation], dt: f64, gradient: &mut [f64]) {
-        self.take(nodes, dt, &[]);
+        self.take(nodes, dt, Measured::Gradient(gradient), 1);
         if matches!(self.way, Way::Iteration) {
             if self.iterate_back(nodes, gradient) {
                 return;
@@ -172,7 +172,9 @@ impl Collocation {
         }
         let block = self.right.n_rows() / STAGES;
         let mut weights = vec![0.0; STAGES * block];
-        weights[(STAGES - 1) * block..][..self.n].copy_from_slice(&gradient[..self.n]);
+        let last = weights[(STAGES - 1) * block..].iter_mut().zip(&*gradient);
+        let last = last.zip(&self.units);
+        last.for_each(|((weight, entry), unit)| *weight = unit * entry);
         match &self.way {
             Way::Full(elimination) => weights = elimination.solve_transposed(&weights).into_vec(),
             Way::Sparse(true) => self.sparse.solve(&mut weights),
@@ -187,18 +189,18 @@ impl Collocation {
     }
 
     /// Chooses the way for these changes, or for one on the way back.
-    fn take(&mut self, nodes: &[Linearisation], dt: f64, columns: &[Vec<f64>]) {
+    fn take(&mut self, nodes: &[Linearisation], dt: f64, measured: Measured, n_columns: usize) {
         self.dt = dt;
         self.way = Way::Sparse(false);
         self.units.fill(1.0);
         if self.n <= MOST_FULL {
-            if let Some(elimination) = self.factor_full(nodes, columns) {
+            if let Some(elimination) = self.factor_full(nodes, measured) {
                 self.way = Way::Full(Box::new(elimination));
                 return;
             }
             self.units.fill(1.0);
         }
-        if columns.len() > MOST_ITERATED {
+        if n_columns > MOST_ITERATED {
             self.way = Way::Sparse(self.factor_sparse(nodes, false));
             return;
         }
@@ -218,23 +220,35 @@ impl Collocation {
             .collect();
         let mut stages: Vec<Vec<f64>> = vec![column[..n].to_vec(); STAGES];
         let mut rates = vec![vec![0.0; n]; STAGES];
-        let mut before = [f64::INFINITY; 2];
+        let (mut changes, mut before) = (vec![0.0_f64; n], [f64::INFINITY; 2]);
         for _ in 0..MOST_ITERATIONS {
             for (i, rates) in rates.iter_mut().enumerate() {
                 self.nodes[i].rates(&stages[i], &by_parameters[i], rates);
             }
             let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            changes.fill(0.0);
             for (stage, weights) in stages.iter_mut().zip(&INTEGRALS) {
                 for r in 0..n {
                     let terms = weights.iter().zip(&rates).map(|(w, rates)| w * rates[r]);
                     let value = column[r] + self.dt * terms.sum::<f64>();
-                    change = change.max((value - stage[r]).abs());
+                    changes[r] = changes[r].max((value - stage[r]).abs());
                     size = size.max(value.abs());
                     stage[r] = value;
                 }
+                change = changes.iter().fold(change, |most, own| own.max(most));
             }
             if change <= self.rest * size {
-                return stages.pop();
+                let mut terms: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
+                for (node, stage) in self.nodes.iter().zip(&stages) {
+                    node.add_terms(stage, self.dt, &mut terms);
+                }
+                for by_parameters in &by_parameters {
+                    let shares = terms.iter_mut().zip(by_parameters);
+                    shares.for_each(|(terms, share)| *terms += (self.dt * share).abs());
+                }
+                if self.are_small(&changes, &terms) {
+                    return stages.pop();
+                }
             }
             if change.is_nan() || change > CONTRACTION * before[0] {
                 return None;
@@ -242,6 +256,12 @@ impl Collocation {
             before = [before[1], change];
         }
         None
+    }
+
+    /// Are the changes of an iteration small beside the terms that each value is made of? States differ in size.
+    fn are_small(&self, changes: &[f64], terms: &[f64]) -> bool {
+        let mut pairs = changes.iter().zip(terms);
+        pairs.all(|(change, terms)| *change <= self.rest * terms)
     }
 
     /// What the shares of the parameters add to each row.
@@ -263,21 +283,30 @@ impl Collocation {
         v[STAGES - 1].copy_from_slice(&gradient[..n]);
         let mut u = v.clone();
         let (mut back, mut multipliers) = (vec![0.0; n], Vector::new());
-        let mut before = [f64::INFINITY; 2];
+        let (mut changes, mut before) = (vec![0.0_f64; n], [f64::INFINITY; 2]);
         for _ in 0..MOST_ITERATIONS {
             let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            changes.fill(0.0);
             integrate_back(&v, &mut u);
             for i in 0..STAGES {
                 self.nodes[i].rates_back(&u[i], &mut back, &mut multipliers);
                 for r in 0..n {
                     let end = if i == STAGES - 1 { gradient[r] } else { 0.0 };
                     let value = end + self.dt * back[r];
-                    change = change.max((value - v[i][r]).abs());
+                    changes[r] = changes[r].max((value - v[i][r]).abs());
                     size = size.max(value.abs());
                     v[i][r] = value;
                 }
+                change = changes.iter().fold(change, |most, own| own.max(most));
             }
+            let mut terms = Vec::new();
             if change <= self.rest * size {
+                terms.extend(gradient[..n].iter().map(|v| v.abs()));
+                for (node, u) in self.nodes.iter().zip(&u) {
+                    node.add_terms_back(u, self.dt, &mut terms);
+                }
+            }
+            if !terms.is_empty() && self.are_small(&changes, &terms) {
                 integrate_back(&v, &mut u);
                 for (i, node) in nodes.iter().enumerate() {
                     self.nodes[i].rates_back(&u[i], &mut back, &mut multipliers);
@@ -313,11 +342,7 @@ impl Collocation {
 
     /// The full matrix, with the multipliers eliminated; `None` where they have no solution. Its rows, and its unknowns, are divided by
     /// powers of two: no digit is lost, and pivots are chosen well where states are of very different size.
-    fn factor_full(
-        &mut self,
-        nodes: &[Linearisation],
-        columns: &[Vec<f64>],
-    ) -> Option<Elimination> {
+    fn factor_full(&mut self, nodes: &[Linearisation], measured: Measured) -> Option<Elimination> {
         let (n, m, dt) = (self.n, self.m, self.dt);
         let n_multipliers = nodes[0].rows().n_rows() - n - m;
         self.right.clear(n + m);
@@ -327,7 +352,7 @@ impl Collocation {
         for (node, slopes) in nodes.iter().zip(all.chunks_exact_mut(size)) {
             eliminated(node.rows(), (n, m, n_multipliers), slopes)?;
         }
-        self.units = units(&all, (n, m, dt), columns);
+        self.units = units(&all, (n, m, dt), measured);
         for (i, slopes) in all.chunks_exact(size).enumerate() {
             let sum: f64 = WEIGHTS[i].iter().sum();
             for r in 0..n {
@@ -394,28 +419,44 @@ impl Collocation {
     }
 }
 
+/// What tells how large changes of the states are: some of them, or the gradient by them of a function at the end.
+#[derive(Clone, Copy)]
+enum Measured<'c> {
+    Changes(&'c [Vec<f64>]),
+    Gradient(&'c [f64]),
+}
+
 /// In what changes of n states are measured over a part of this length, by their derivatives at the nodes: the size that each state has
 /// at the start, or comes to on the way. A state that is zero but for rounding is not measured by that where others act on it.
-fn units(slopes: &[f64], (n, m, dt): (usize, usize, f64), columns: &[Vec<f64>]) -> Vec<f64> {
+/// Of a gradient the sizes are those of its entries, which act the other way round, and changes are measured by what they amount to.
+fn units(slopes: &[f64], (n, m, dt): (usize, usize, f64), measured: Measured) -> Vec<f64> {
     let width = n + m;
     let mut largest = vec![0.0_f64; n * width];
     for node in slopes.chunks_exact(n * width) {
         let entries = largest.iter_mut().zip(node);
         entries.for_each(|(most, slope)| *most = most.max((dt * slope).abs()));
     }
-    let at_start = |r: usize| columns.iter().fold(0.0_f64, |most, c| most.max(c[r].abs()));
-    let mut sizes: Vec<f64> = (0..width).map(at_start).collect();
+    let size = |r: usize| match measured {
+        Measured::Changes(columns) => columns.iter().fold(0.0_f64, |most, c| most.max(c[r].abs())),
+        Measured::Gradient(gradient) => gradient[r].abs(),
+    };
+    let (action, n_acting): (&dyn Fn(usize, usize) -> f64, _) = match measured {
+        Measured::Changes(_) => (&|r, c| largest[r * width + c], width),
+        Measured::Gradient(_) => (&|r, c| largest[c * width + r], n),
+    };
+    let mut sizes: Vec<f64> = (0..n_acting).map(size).collect();
     for _ in 0..n {
         for r in 0..n {
-            let row = &largest[r * width..][..width];
-            let others = row.iter().zip(&sizes).enumerate();
-            let others = others.filter(|(c, _)| *c != r);
-            let share = others.fold(0.0_f64, |most, (_, (slope, size))| most.max(slope * size));
-            sizes[r] = sizes[r].max(share / (1.0 + row[r]));
+            let others = (0..n_acting).filter(|c| *c != r);
+            let share = others.fold(0.0_f64, |most, c| most.max(action(r, c) * sizes[c]));
+            sizes[r] = sizes[r].max(share / (1.0 + action(r, r)));
         }
     }
-    let states = sizes[..n].iter();
-    states.map(|size| power_of_two_below(*size)).collect()
+    let states = sizes[..n].iter().map(|size| match measured {
+        Measured::Changes(_) => *size,
+        Measured::Gradient(_) => 1.0 / size,
+    });
+    states.map(power_of_two_below).collect()
 }
 
 /// The largest power of two that is not above a positive normal number; 1 for others.
@@ -462,6 +503,26 @@ impl Node {
         }
         for (r, out) in out.iter_mut().enumerate() {
             *out = -self.rows.dot(r, &all) - by_parameters[r];
+        }
+    }
+
+    /// Adds the sizes of what the states, and the multipliers that follow from them, have in the rates over a length of time.
+    fn add_terms(&self, change: &[f64], dt: f64, terms: &mut [f64]) {
+        let (n, n_rows) = (change.len(), self.rows.n_rows());
+        let mut all = change.to_vec();
+        all.resize(n_rows, 0.0);
+        let known: Vector = (n..n_rows).map(|k| self.rows.dot(k, &all)).collect();
+        all[n..].copy_from_slice(&self.multipliers.solve(&known));
+        for (r, terms) in terms.iter_mut().enumerate() {
+            *terms += dt.abs() * self.rows.magnitude(r, &all);
+        }
+    }
+
+    /// The same of the transpose.
+    fn add_terms_back(&self, weights: &[f64], dt: f64, terms: &mut [f64]) {
+        for (r, weight) in weights.iter().enumerate() {
+            let entries = self.rows.row(r).filter(|(c, _)| *c < weights.len());
+            entries.for_each(|(c, value)| terms[c] += (dt * weight * value).abs());
         }
     }
 

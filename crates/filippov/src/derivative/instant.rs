@@ -48,6 +48,9 @@ impl Lost {
 
 /// By what time and states are measured in the condition of an instant.
 pub(super) struct Weights {
+    /// When the run starts.
+    pub start: f64,
+    /// How long it was meant to be.
     pub span: f64,
     pub rtol: f64,
     pub atol: Vec<f64>,
@@ -59,24 +62,36 @@ impl Weights {
         x.abs() + atol.unwrap_or(0.0) / self.rtol
     }
 
-    /// The length of a gradient: how much a function changes if time and states do so by their size.
-    fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64])) -> f64 {
+    /// The length of a gradient: how much a function changes if the time does so by a unit, and states by their size.
+    fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), unit: f64) -> f64 {
         let pairs = x.iter().zip(gradient).enumerate();
         let by_state = pairs.map(|(i, (x, g))| (g * self.of(i, *x)).powi(2));
-        ((by_time * self.span).powi(2) + by_state.sum::<f64>()).sqrt()
+        ((by_time * unit).powi(2) + by_state.sum::<f64>()).sqrt()
     }
 
-    /// 1 / |cos| of the angle between a gradient and a motion.
-    fn condition(&self, x: &[f64], gradient: (f64, &[f64]), field: &[f64]) -> f64 {
-        let rate = gradient.0 + dot(gradient.1, field);
-        let moving = field
-            .iter()
-            .zip(x)
-            .enumerate()
-            .filter(|(_, (f, _))| **f != 0.0);
+    /// How many sizes of the states a motion goes in a time.
+    fn speed(&self, x: &[f64], field: &[f64]) -> f64 {
+        let all = field.iter().zip(x).enumerate();
+        let moving = all.filter(|(_, (f, _))| **f != 0.0);
         let parts = moving.map(|(i, (f, x))| (f / self.of(i, *x)).powi(2));
-        let speed = (self.span.powi(-2) + parts.sum::<f64>()).sqrt();
-        self.length(x, gradient) * speed / rate.abs()
+        parts.fold(0.0, |sum, part| sum + part).sqrt()
+    }
+
+    /// In what time states change by their size; of a motion at rest, the time until then. However long the run was meant to be.
+    fn time_of_change(&self, t: f64, x: &[f64], field: &[f64]) -> f64 {
+        let so_far = if t > self.start {
+            t - self.start
+        } else {
+            self.span
+        };
+        self.span.min(so_far).min(1.0 / self.speed(x, field))
+    }
+
+    /// 1 / |cos| of the angle between a gradient and a motion, in this unit of time.
+    fn condition(&self, x: &[f64], gradient: (f64, &[f64]), field: &[f64], unit: f64) -> f64 {
+        let rate = gradient.0 + dot(gradient.1, field);
+        let speed = (unit.powi(-2) + self.speed(x, field).powi(2)).sqrt();
+        self.length(x, gradient, unit) * speed / rate.abs()
     }
 }
 
@@ -222,23 +237,23 @@ impl Instant<'_, '_> {
         let timing = self.before.gradient_of(guard, record.t[0], &z)?;
         let field = record.field[0];
         let states = &timing.state[..self.extended.n];
-        *condition = weights.condition(record.x[0], (timing.time, states), field);
+        let (x, gradient) = (record.x[0], (timing.time, states));
+        *condition = weights.condition(x, gradient, field, weights.span);
+        let unit = weights.time_of_change(record.t[0], x, field);
         let rate = timing.time + dot(&timing.state, field);
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
         let most = if touches { AT_SIDE } else { ROUNDING };
-        let is_regular = *condition < 1.0 / most && rate != 0.0;
+        let is_regular = weights.condition(x, gradient, field, unit) < 1.0 / most && rate != 0.0;
         // A touch at which the function is stationary, as cos(x) - p is at p = 1, is moved by the parameters alone.
         let by_parameters = timing.state[self.extended.n..].iter();
         let values = self.extended.values.iter().map(|p| 1.0 + p.abs());
         let moved = by_parameters.zip(values).map(|(g, p)| (g * p).abs());
-        let is_moved = touches && moved.sum::<f64>() * AT_SIDE > rate.abs() * weights.span;
+        let is_moved = touches && moved.sum::<f64>() * AT_SIDE > rate.abs() * unit;
         // A multiplier is of size 1. Where it is so steep, or where the equations of an affine field become singular, it is a
         // quotient of two functions that vanish, and neither it nor the field before is known.
         let is_pole = match guard {
-            Guard::Multiplier { .. } => {
-                weights.length(record.x[0], (timing.time, states)) > 1.0 / AT_SIDE
-            }
+            Guard::Multiplier { .. } => weights.length(x, gradient, unit) > 1.0 / AT_SIDE,
             Guard::Root(RootEnd::Fold) => self.before.is_affine,
             _ => false,
         };

@@ -156,6 +156,7 @@ impl<'a> Tangents<'a> {
         Tangents {
             around: Surroundings::at_start(extended, impacts, options),
             weights: Weights {
+                start: f64::INFINITY,
                 span,
                 rtol: options.rtol,
                 atol: options.atol.clone(),
@@ -204,6 +205,7 @@ impl<'a> Tangents<'a> {
 
     fn start(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) -> Result<(), FieldError> {
         self.t_start = Some(t);
+        self.weights.start = t;
         self.around.take_sides(mode);
         let n = self.around.extended.n;
         let z = self.around.extended.state(x);

@@ -78,6 +78,12 @@ pub trait UserFunction {
     fn parts(&self) -> Option<&dyn SmoothParts> {
         None
     }
+
+    /// The surface whose switching function g is a multiple of, and the sign of the factor. Then g is zero where the motion arrives
+    /// at that surface, and nowhere else.
+    fn surface(&self) -> Option<(usize, f64)> {
+        None
+    }
 }
 
 /// A function whose kinks and jumps are known: it is smooth between the zeros of switching functions inside of it.

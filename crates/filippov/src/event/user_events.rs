@@ -2,8 +2,10 @@
 
 use std::cell::RefCell;
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
-use crate::event::UserEvent;
+use crate::event::{Found, UserEvent};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +59,8 @@ pub(crate) struct UserEvents<'a> {
     q: Vec<f64>,
     /// What happens at the end of the step that is searched.
     pub end: StepEnd,
+    /// The surfaces at which the motion arrives there; `None` if rounding leaves a doubt.
+    pub arrives_at: Option<SmallVec<[usize; 2]>>,
     /// Have they changed where the motion began? Every function may have jumped there.
     pub may_have_jumped: bool,
     /// Time of the last zero, per event: divided out while it is the start of the search.
@@ -83,6 +87,7 @@ impl<'a> UserEvents<'a> {
             at_end: RefCell::new(vec![AtEnd::of_side(0.0); d]),
             q: Vec::new(),
             end: StepEnd::GoesOn,
+            arrives_at: Some(SmallVec::new()),
             may_have_jumped: false,
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
@@ -93,10 +98,23 @@ impl<'a> UserEvents<'a> {
         }
     }
 
+    /// Takes down where the step that is searched ends: what happens there, and which guards vanish.
+    pub fn expect(&mut self, end: StepEnd, found: Option<&Found>) {
+        self.end = end;
+        let is_clear = found.is_none_or(|event| !event.touch && !event.is_blurred);
+        let surfaces = found.into_iter().flat_map(Found::surfaces);
+        self.arrives_at = is_clear.then(|| surfaces.collect());
+    }
+
     /// Evaluates the functions at the start of a motion.
     pub fn restart(&mut self, t: f64, x: &[f64], q: &[f64]) -> Result<(), FieldError> {
-        for (event, left) in self.events.iter().zip(&mut self.left) {
-            *left = event.function.value(t, x, q)?;
+        for (k, event) in self.events.iter().enumerate() {
+            let (before, now) = (self.left[k], event.function.value(t, x, q)?);
+            // A zero from which the state has jumped is behind the motion.
+            if self.sides[k] == 0.0 && now != before {
+                self.last[k] = f64::NAN;
+            }
+            self.left[k] = now;
         }
         self.may_have_jumped = self.end == StepEnd::Law || self.q != q;
         self.q.clear();
@@ -124,6 +142,7 @@ impl<'a> UserEvents<'a> {
             sides: self.sides.clone(),
             at_end: self.at_end.clone(),
             q: self.q.clone(),
+            arrives_at: self.arrives_at.clone(),
             last: self.last.clone(),
             zeros: vec![Vec::new(); self.zeros.len()],
             n_zeros: self.n_zeros.clone(),

@@ -8,7 +8,7 @@ use crate::decisions::{
     decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides,
 };
 use crate::error::FieldError;
-use crate::error_scale::ErrorScale;
+use crate::error_scale::{ErrorScale, Units};
 use crate::mode::Mode;
 use crate::motion::Leading;
 use crate::motion::{ActiveSurfaces, Guard, Law, MeetingFields, ModeField, SmoothField};
@@ -221,7 +221,7 @@ pub fn classify(
     };
     let around_signs = around.signs();
     let around = place.with_signs(&around_signs);
-    let Some(components) = components_around(system, &around, &surfaces)? else {
+    let Some(components) = components_around(system, (&around, law.units), &surfaces)? else {
         return Ok(None);
     };
     let mut found = describe(system, &place, law, decision, notes)?;
@@ -276,7 +276,7 @@ pub fn contradicts(
 /// The normal components of all fields around a place, if they are few; `None` if one is not finite.
 fn components_around(
     system: &dyn PiecewiseSystem,
-    place: &Place<'_>,
+    (place, units): (&Place<'_>, Units<'_>),
     surfaces: &[usize],
 ) -> Result<Option<Vec<f64>>, FieldError> {
     if surfaces.is_empty() {
@@ -289,7 +289,7 @@ fn components_around(
         return Ok(Some(Vec::new()));
     }
     let mut corners = MeetingFields::new(system, surfaces);
-    corners.evaluate(system, place)?;
+    corners.evaluate(system, place, units)?;
     let fields = corners.normal_fields();
     Ok(fields.ok().map(|fields| fields.values().into_owned()))
 }

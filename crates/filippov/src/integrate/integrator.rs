@@ -307,7 +307,8 @@ impl<'a> Integrator<'a> {
         let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
         if !self.recorder.user_events.events.is_empty() {
-            self.recorder.user_events.end = self.end_of_step(found.as_ref(), t_stop);
+            let end = self.end_of_step(found.as_ref(), t_stop);
+            self.recorder.user_events.expect(end, found.as_ref());
         }
         let (mut search, recorder) = self.step_search();
         let Some(zeros) = recorder.find_user_zeros(&mut search, theta, t_stop)? else {

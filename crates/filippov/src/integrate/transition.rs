@@ -13,6 +13,7 @@ use crate::decisions::{
     Next, Notes, Point, Reached, RestingPlace, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
@@ -936,7 +937,8 @@ impl<'a> Integrator<'a> {
     /// with a root of the distance brings it to rest so. Beside the surface the motion would follow the root of rounding.
     pub(super) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
         let run = &mut self.run;
-        let mut projector = Projector::new(run.x.len(), run.motion.signs.len());
+        let units = Units::from(run.options).parts(run.x.len());
+        let mut projector = Projector::new(run.x.len(), run.motion.signs.len()).measured_in(units);
         let setting = run.motion.setting();
         // The flights beside a surface of higher degree are below its rounding.
         projector.project_onto_rates(run.system, &[j], run.t, &mut run.x, setting)?;

@@ -27,6 +27,8 @@ pub struct AffineLaw<'a> {
     known_ends: Option<(Vec<f64>, [f64; 2])>,
     /// No two gradients have a state in common.
     is_orthogonal: bool,
+    /// The unit in which each state is moved; empty: one for all.
+    units: Vec<f64>,
     multipliers: Vec<f64>,
     /// The multipliers last found are not the only ones: redundant contacts share their load.
     shared: Option<SharedLoad>,
@@ -49,6 +51,7 @@ impl<'a> AffineLaw<'a> {
             is_orthogonal: parts.gradients.has_disjoint_rows(),
             parts,
             known_ends: None,
+            units: Vec::new(),
             setting,
             h: vec![0.0; system.n_surfaces()],
             kappa: vec![1.0; set.len()],
@@ -87,6 +90,11 @@ impl<'a> AffineLaw<'a> {
         self.multipliers.fill(f64::NAN);
         self.shared = None;
         self.begin();
+    }
+
+    /// Sets the units in which states are moved; empty: one for all.
+    pub(super) fn set_units(&mut self, units: &[f64]) {
+        self.units = units.to_vec();
     }
 
     /// A motion begins.
@@ -257,12 +265,14 @@ impl<'a> AffineLaw<'a> {
                 if h == 0.0 || h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
                     continue;
                 }
-                let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
+                let unit = |i: usize| self.units.get(i).copied().unwrap_or(1.0);
+                let entries = || gradients.row(row).map(|(i, g)| (i, g * unit(i)));
+                let square: f64 = entries().map(|(_, g)| g * g).sum();
                 if square == 0.0 {
                     continue;
                 }
                 is_near = false;
-                gradients.row(row).for_each(|(i, g)| x[i] -= g * h / square);
+                entries().for_each(|(i, g)| x[i] -= g * unit(i) * h / square);
             }
             if is_near {
                 break;

@@ -12,6 +12,7 @@ use super::{
     SmoothField,
 };
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
 use crate::page::IS_PAGE;
@@ -38,6 +39,8 @@ pub(crate) struct Law<'a> {
     pub kappa: &'a [f64],
     /// The factor of the term that draws it back, in place of the projection.
     pub restoring: Option<f64>,
+    /// The sizes of the states.
+    pub units: Units<'a>,
 }
 
 impl<'a> From<&'a Options> for Law<'a> {
@@ -46,6 +49,7 @@ impl<'a> From<&'a Options> for Law<'a> {
             rule: options.sliding,
             kappa: &options.kappa,
             restoring: options.stabilization.restoring(),
+            units: options.into(),
         }
     }
 }
@@ -88,12 +92,13 @@ impl<'a> ModeField<'a> {
         match *sliding {
             [] => ModeField::Region(RegionField::new(system, setting)),
             [j] => {
-                let field = SlidingField::new(system, j, setting);
+                let field = SlidingField::new(system, j, setting).with_units(law.units);
                 ModeField::Sliding(Box::new(field.with_restoring(law.restoring)))
             }
             _ => {
                 let field = IntersectionField::new(system, sliding, setting, &[]);
                 let field = field.with_rule(law.rule).with_restoring(law.restoring);
+                let field = field.with_units(law.units);
                 ModeField::Intersection(Box::new(field.with_scaling(&law.scaling(sliding))))
             }
         }
@@ -266,7 +271,8 @@ impl<'a> ReducedField<'a> {
             system,
             surfaces: SlidingSet::from_slice(surfaces),
             setting: OwnSetting::new(setting),
-            projector: Projector::new(system.n_states(), system.n_surfaces()),
+            projector: Projector::new(system.n_states(), system.n_surfaces())
+                .measured_in(law.units.parts(system.n_states())),
             reduced,
             inner: Box::new(ModeField::new(reduced, law, surfaces, setting)),
         })

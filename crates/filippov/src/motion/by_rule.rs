@@ -7,6 +7,7 @@ use super::MeetingFields;
 use crate::cube::Lap;
 use crate::cube::NormalFields;
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::system::{PiecewiseSystem, Place};
@@ -56,11 +57,11 @@ impl RuleLaw {
     pub fn eval(
         &mut self,
         system: &dyn PiecewiseSystem,
-        place: &Place<'_>,
+        (place, units): (&Place<'_>, Units<'_>),
         lambda: &mut Vec<f64>,
         dx: &mut [f64],
     ) -> Result<u64, FieldError> {
-        let evaluations = self.fields.evaluate(system, place)?;
+        let evaluations = self.fields.evaluate(system, place, units)?;
         match self.solve() {
             Some(found) => {
                 *lambda = found;

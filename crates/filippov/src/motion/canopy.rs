@@ -7,6 +7,7 @@ use crate::cube::{
     NormalFields,
 };
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::patience::Patience;
 use crate::system::{PiecewiseSystem, Place};
 use crate::tolerances::TRACKED_CHANGE;
@@ -41,8 +42,9 @@ impl Canopy {
         &mut self,
         system: &dyn PiecewiseSystem,
         place: &Place<'_>,
+        units: Units<'_>,
     ) -> Result<u64, FieldError> {
-        self.fields.evaluate(system, place)
+        self.fields.evaluate(system, place, units)
     }
 
     /// Are all fields finite that were evaluated last?

@@ -138,6 +138,11 @@ impl<'a> CurrentMotion<'a> {
         self.known.wake(&self.asleep);
     }
 
+    /// Is an arrival at this surface looked for?
+    pub fn looks_for(&self, j: usize) -> bool {
+        !self.is_held && self.known.active().has(j)
+    }
+
     /// Makes the field that of the mode.
     #[inline(always)]
     fn restart_field(&mut self, system: &'a dyn PiecewiseSystem) {

@@ -9,6 +9,7 @@ use super::{
     AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
 };
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::page::IS_PAGE;
@@ -58,6 +59,8 @@ pub struct IntersectionField<'a> {
     projector: Projector,
     /// The factor of the term that draws the motion back, in place of the projection.
     restoring: Option<f64>,
+    /// The sizes of the states.
+    units: Units<'a>,
     /// How long a search for the first multipliers may take.
     patience: Patience<'a>,
     n_evaluations: u64,
@@ -100,6 +103,7 @@ impl<'a> IntersectionField<'a> {
             oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             restoring: None,
+            units: Units::ONES,
             patience: Patience::endless(),
             n_evaluations: 0,
         }
@@ -133,6 +137,18 @@ impl<'a> IntersectionField<'a> {
     #[must_use]
     pub fn with_restoring(mut self, restoring: Option<f64>) -> Self {
         self.restoring = restoring;
+        self
+    }
+
+    /// The same for states of these sizes.
+    #[must_use]
+    pub(crate) fn with_units(mut self, units: Units<'a>) -> Self {
+        let parts = units.parts(self.system.n_states());
+        if let Some(law) = &mut self.affine {
+            law.set_units(&parts);
+        }
+        self.projector = self.projector.measured_in(parts);
+        self.units = units;
         self
     }
 
@@ -308,7 +324,8 @@ impl<'a> IntersectionField<'a> {
         }
         if let Some(law) = &mut self.by_rule {
             let place = self.setting.at(t, x);
-            self.n_evaluations += law.eval(self.system, &place, &mut self.lambda, dx)?;
+            self.n_evaluations +=
+                law.eval(self.system, (&place, self.units), &mut self.lambda, dx)?;
             self.exits.copy_from_slice(law.exits());
             return Ok(());
         }
@@ -327,7 +344,8 @@ impl<'a> IntersectionField<'a> {
         }
         let found = match &mut self.canopy {
             Some(canopy) => {
-                self.n_evaluations += canopy.evaluate(self.system, &self.setting.at(t, x))?;
+                self.n_evaluations +=
+                    canopy.evaluate(self.system, &self.setting.at(t, x), self.units)?;
                 canopy.solve(
                     &by_distance(&self.tracked, t),
                     &mut self.oscillates,
@@ -362,7 +380,7 @@ impl<'a> IntersectionField<'a> {
             return Ok(());
         };
         let mut around = MeetingFields::new(self.system, &self.set);
-        self.n_evaluations += around.evaluate(self.system, &self.setting.at(t, x))?;
+        self.n_evaluations += around.evaluate(self.system, &self.setting.at(t, x), self.units)?;
         let mut weights = Vec::new();
         around.fill_product_weights(&lambda, &mut weights);
         around.combine(&weights, dx);

@@ -7,7 +7,8 @@ use super::{parallel, sense_of, Tie};
 use crate::cube::{Matrix, NormalFields, SignGroup};
 use crate::error::FieldError;
 use crate::error::Undecided;
-use crate::system::{dot, eval_on_side, PiecewiseSystem, Place};
+use crate::error_scale::Units;
+use crate::system::{dot, dot_magnitude, eval_on_side, PiecewiseSystem, Place};
 use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
@@ -35,6 +36,8 @@ pub struct MeetingFields {
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
     signs: Vec<f64>,
+    /// The sizes of the states.
+    sizes: Vec<f64>,
     /// Surfaces in one place, since the first evaluation.
     ties: Option<Vec<Tie>>,
 }
@@ -73,6 +76,7 @@ impl MeetingFields {
             gradients: vec![0.0; n * m],
             time_derivatives: vec![0.0; m],
             signs: Vec::new(),
+            sizes: vec![1.0; n],
             ties: None,
         }
     }
@@ -101,8 +105,12 @@ impl MeetingFields {
         &mut self,
         system: &dyn PiecewiseSystem,
         place: &Place<'_>,
+        units: Units<'_>,
     ) -> Result<u64, FieldError> {
         let (n, m) = (self.n, self.set.len());
+        let units = units.at(place.x);
+        let sizes = self.sizes.iter_mut().enumerate();
+        sizes.for_each(|(k, size)| *size = units.of_state(k));
         self.signs.clear();
         self.signs.extend_from_slice(place.signs);
         for (i, &j) in self.set.iter().enumerate() {
@@ -146,14 +154,14 @@ impl MeetingFields {
             }
         }
         if self.ties.is_none() {
-            let ties = self.find_ties(system, place)?;
+            let ties = self.find_ties(system, place, units)?;
             let is_split = !ties.is_empty() && !self.has_all_patterns();
             if is_split {
                 *self = MeetingFields::of_all_patterns(system, &self.set);
             }
             self.ties = Some(ties);
             if is_split {
-                return Ok(evaluations + self.evaluate(system, place)?);
+                return Ok(evaluations + self.evaluate(system, place, units)?);
             }
         }
         self.tie();
@@ -164,15 +172,17 @@ impl MeetingFields {
         &self,
         system: &dyn PiecewiseSystem,
         place: &Place<'_>,
+        units: Units<'_>,
     ) -> Result<Vec<Tie>, FieldError> {
         let mut ties: Vec<Tie> = Vec::new();
         let m = self.set.len();
         if m > MOST_MEETING {
             return Ok(ties);
         }
+        let units = units.with_pace(self.pace(|k| self.sizes[k]));
         for (leader, follower) in (0..m).flat_map(|i| (i + 1..m).map(move |k| (i, k))) {
             let is_tied = |tie: &Tie| tie.follower == follower || tie.follower == leader;
-            if ties.iter().any(is_tied) || !self.has_parallel(leader, follower) {
+            if ties.iter().any(is_tied) || !self.has_parallel([leader, follower], place, units) {
                 continue;
             }
             let pair = [self.set[leader], self.set[follower]];
@@ -180,7 +190,7 @@ impl MeetingFields {
             let own = ties.iter().filter(|tie| tie.leader == leader);
             let tied: SmallVec<[_; 2]> =
                 own.map(|tie| (self.set[tie.follower], tie.sense)).collect();
-            if let Some(sense) = sense_of(system, place, pair, &tied)? {
+            if let Some(sense) = sense_of(system, (place, units), pair, &tied)? {
                 ties.push(Tie {
                     leader,
                     follower,
@@ -192,13 +202,13 @@ impl MeetingFields {
     }
 
     /// Have two surfaces of the set the same normal?
-    fn has_parallel(&self, i: usize, k: usize) -> bool {
-        let [one, other] = [i, k].map(|i| {
+    fn has_parallel(&self, pair: [usize; 2], place: &Place<'_>, units: Units<'_>) -> bool {
+        let [one, other] = pair.map(|i| {
             let mut row = self.gradients[i * self.n..(i + 1) * self.n].to_vec();
             row.push(self.time_derivatives[i]);
             row
         });
-        parallel(&one, &other)
+        parallel(&one, &other, place, units)
     }
 
     /// Fills in what stands for the regions that do not exist.
@@ -298,42 +308,43 @@ impl MeetingFields {
         &self.gradients[i * self.n..][..self.n_own]
     }
 
-    /// The largest component of all fields.
-    pub fn size(&self) -> f64 {
-        self.fields.iter().fold(0.0, |size, v| v.abs().max(size))
-    }
-
     /// Does the field depend on the sign of surface `i`, by more than rounding? Asked where all patterns are held one by one.
     pub fn depends_on(&self, i: usize) -> bool {
-        let noise = TANGENT * self.size();
+        let differs = |up: usize, k: usize| {
+            let [one, other] = [up, up ^ 1 << i].map(|pattern| self.field(pattern)[k]);
+            // In its own unit: states differ in size.
+            let fields = self.fields.iter().skip(k).step_by(self.n);
+            let largest = fields.fold(0.0_f64, |size, v| v.abs().max(size));
+            (one - other).abs() > TANGENT * largest
+        };
         let mut up = (0..1_usize << self.set.len()).filter(|pattern| pattern >> i & 1 == 1);
-        !self.has_all_patterns()
-            || up.any(|up| {
-                let mut pairs = self.field(up).iter().zip(self.field(up ^ 1 << i));
-                pairs.any(|(a, b)| (a - b).abs() > noise)
-            })
+        !self.has_all_patterns() || up.any(|up| (0..self.n).any(|k| differs(up, k)))
     }
 
-    /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others
-    /// all fields are tangent, up to rounding.
+    /// The surfaces, counted within the set, whose equation says anything about the multipliers. The others are crossed by
+    /// all fields at one speed, which is zero: up to rounding of the terms that it is made of, and in the sizes of the states.
     pub fn telling(&self) -> Vec<usize> {
-        let m = self.set.len();
-        // Sums over groups of what is largest in each.
-        let over_groups = |largest: &dyn Fn(usize) -> f64| {
-            let mut row = 0;
-            let groups = self.groups.iter().map(|group| {
-                let rows = row..row + (1 << group.len());
-                row = rows.end;
-                rows.map(largest).fold(0.0, f64::max)
-            });
-            groups.sum::<f64>()
-        };
-        let square = |v: &[f64]| dot(v, v);
-        let fastest =
-            over_groups(&|row| square(&self.fields[row * self.n..(row + 1) * self.n]).sqrt());
+        let (m, n) = (self.set.len(), self.n);
+        let pace = self.pace(|k| self.sizes[k]);
         let is_telling = |&i: &usize| {
-            let size = square(self.normal(i)).sqrt() * fastest;
-            over_groups(&|row| self.components[row * m + i].abs()) > DOUBTFUL * size
+            let gradient = &self.gradients[i * n..(i + 1) * n];
+            let reach = dot_magnitude(gradient, &self.sizes) * pace;
+            let (mut spread, mut largest, mut row) = (0.0, 0.0, 0);
+            let mut size = self.time_derivatives[i].abs();
+            for group in &self.groups {
+                let [mut low, mut high, mut terms] = [f64::INFINITY, f64::NEG_INFINITY, 0.0];
+                for _ in 0..1 << group.len() {
+                    let component = self.components[row * m + i];
+                    (low, high) = (component.min(low), component.max(high));
+                    let field = &self.fields[row * n..(row + 1) * n];
+                    terms = dot_magnitude(gradient, field).max(terms);
+                    row += 1;
+                }
+                spread += high - low;
+                largest += high.max(-low);
+                size += terms;
+            }
+            spread > DOUBTFUL * size || largest > DOUBTFUL * reach
         };
         (0..m).filter(is_telling).collect()
     }

@@ -17,6 +17,8 @@ pub struct Projector {
     gradient: Vec<f64>,
     /// The gradients of several surfaces.
     rows: Vec<f64>,
+    /// The unit in which each state is moved; empty: one for all.
+    units: Vec<f64>,
 }
 
 impl Projector {
@@ -26,10 +28,19 @@ impl Projector {
             h: vec![0.0; d],
             gradient: vec![0.0; n],
             rows: Vec::new(),
+            units: Vec::new(),
         }
     }
 
-    /// Moves `x` onto h_j(t, x) = 0 along the gradient: x <- x - h grad h / |grad h|^2, repeated
+    /// The same in these units of the states, which may be left out if all have one: what is near does not depend on those of
+    /// the user.
+    #[must_use]
+    pub fn measured_in(mut self, units: Vec<f64>) -> Self {
+        self.units = units;
+        self
+    }
+
+    /// Moves `x` onto h_j(t, x) = 0 along the gradient: x <- x - h U^2 grad h / |U grad h|^2 with the units U, repeated
     /// until |h| is at the level of rounding, at most four times; once if h is affine.
     ///
     /// # Errors
@@ -51,18 +62,20 @@ impl Projector {
                 break;
             }
             system.gradient(j, &place, &mut self.gradient)?;
-            let norm2: f64 = self.gradient.iter().map(|g| g * g).sum();
             let size: f64 = self
                 .gradient
                 .iter()
                 .zip(&*x)
                 .map(|(g, x)| (g * x).abs())
                 .sum();
+            scale(&mut self.gradient, &self.units);
+            let norm2: f64 = self.gradient.iter().map(|g| g * g).sum();
             // A root may have no slope on its surface.
             if norm2 == 0.0 || !norm2.is_finite() || h.abs() <= 0.25 * ROUNDING * size {
                 break;
             }
             let shift = h / norm2;
+            scale(&mut self.gradient, &self.units);
             x.iter_mut()
                 .zip(&self.gradient)
                 .for_each(|(x, g)| *x -= shift * g);
@@ -70,7 +83,7 @@ impl Projector {
         Ok(())
     }
 
-    /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
+    /// Moves `x` onto all surfaces of `set` at once, x <- x - U N^T (N N^T)^-1 h with U times the gradients as the rows of N,
     /// repeated until every |h| is at the level of rounding, at most eight times. A surface whose gradient depends on those
     /// of others is in the place of them, and goes with them.
     ///
@@ -101,11 +114,8 @@ impl Projector {
                 break;
             }
             let h: Vector = set.iter().map(|&j| self.h[j]).collect();
-            let Some(shifts) = shares_of_rows(&self.rows, &h) else {
+            if !self.shift(&h, x) {
                 break;
-            };
-            for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
-                x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
             }
         }
         Ok(())
@@ -165,14 +175,25 @@ impl Projector {
             if is_near {
                 break;
             }
-            let Some(shifts) = shares_of_rows(&self.rows, &values) else {
+            if !self.shift(&values, x) {
                 break;
-            };
-            for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
-                x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
             }
         }
         Ok(())
+    }
+
+    /// Takes away from `x` the shortest move that changes the functions by these values; `false` if none is known.
+    fn shift(&mut self, values: &Vector, x: &mut [f64]) -> bool {
+        let rows = self.rows.chunks_exact_mut(x.len());
+        rows.for_each(|row| scale(row, &self.units));
+        let Some(shares) = shares_of_rows(&self.rows, values) else {
+            return false;
+        };
+        for (row, share) in self.rows.chunks_exact_mut(x.len()).zip(shares) {
+            scale(row, &self.units);
+            x.iter_mut().zip(row).for_each(|(x, g)| *x -= share * *g);
+        }
+        true
     }
 
     /// Adds the term that draws a point beside the surfaces back to them, -C sum h_j grad h_j.
@@ -195,6 +216,13 @@ impl Projector {
         }
         Ok(())
     }
+}
+
+/// Multiplies a row by the units, if states have different ones.
+fn scale(row: &mut [f64], units: &[f64]) {
+    row.iter_mut()
+        .zip(units)
+        .for_each(|(entry, unit)| *entry *= unit);
 }
 
 /// The combination of some rows, one after the other, that is the shortest vector with these inner products with them:

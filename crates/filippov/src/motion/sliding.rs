@@ -6,6 +6,7 @@ use super::duties::Exits;
 use super::guard::Guards;
 use super::{Guard, Motion, Projector, SmoothField};
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::motion::TwoFoldMotion;
 use crate::system::{BothSides, OwnSetting, PiecewiseSystem, Setting};
 
@@ -91,6 +92,14 @@ impl<'a> SlidingField<'a> {
             last_time: f64::NAN,
             two_fold: None,
         }
+    }
+
+    /// The same for states of these sizes.
+    #[must_use]
+    pub(crate) fn with_units(mut self, units: Units<'_>) -> Self {
+        let parts = units.parts(self.system.n_states());
+        self.projector = self.projector.measured_in(parts);
+        self
     }
 
     /// The same drawn back to the surface by a term with this factor, if there is one, and not projected.

@@ -2,6 +2,7 @@
 
 use super::Projector;
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::system::{dot, PiecewiseSystem, Place};
 use crate::tolerances::{BESIDE, ROUNDING, TANGENT};
 
@@ -37,7 +38,7 @@ impl Tie {
 /// If a function of the user raises.
 pub fn sense_of(
     system: &dyn PiecewiseSystem,
-    place: &Place<'_>,
+    (place, units): (&Place<'_>, Units<'_>),
     [j, k]: [usize; 2],
     tied: &[(usize, i8)],
 ) -> Result<Option<i8>, FieldError> {
@@ -55,7 +56,8 @@ pub fn sense_of(
         let on_side = place.with_signs(&signs);
         let [one, other] = [j, k].map(|j| normal(system, &on_side, j));
         let (one, other) = (one?, other?);
-        if !parallel(&one, &other) || in_the_place_of(system, &on_side, j, &[k])?.is_empty() {
+        let are_parallel = parallel(&one, &other, &on_side, units);
+        if !are_parallel || in_the_place_of(system, (&on_side, units), j, &[k])?.is_empty() {
             return Ok(None);
         }
         *sense = dot(&one, &other)
@@ -98,7 +100,7 @@ fn let_others_jump(
 /// If a function of the user raises.
 pub fn in_the_place_of(
     system: &dyn PiecewiseSystem,
-    place: &Place<'_>,
+    (place, units): (&Place<'_>, Units<'_>),
     j: usize,
     others: &[usize],
 ) -> Result<Vec<usize>, FieldError> {
@@ -107,7 +109,7 @@ pub fn in_the_place_of(
     let (mut found, mut gradient) = (others.to_vec(), vec![0.0; place.x.len()]);
     // Beside the place, so that surfaces that only touch are told apart.
     for distance in BESIDE {
-        let (later, beside) = beside_on(system, place, j, distance)?;
+        let (later, beside) = beside_on(system, (place, units), j, distance)?;
         let moved = place.moved(later, &beside);
         system.surfaces(&moved, &mut h[0])?;
         let is_on = h[0][j].abs() <= ROUNDING * system.surface_size(j, &moved)?;
@@ -119,7 +121,9 @@ pub fn in_the_place_of(
         let mut vanishing = Vec::with_capacity(found.len());
         for k in found {
             let rate = system.gradient(k, &moved, &mut gradient)?;
-            let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
+            let entries = gradient.iter().enumerate();
+            let parts = entries.map(|(i, g)| g.abs() * units.of_state(i));
+            let size = parts.sum::<f64>() + rate.abs() * units.of_time(place.t);
             // One with a multiple zero has no gradient there.
             let is_zero = h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size;
             if is_zero || is_far && !size.is_finite() {
@@ -137,16 +141,18 @@ pub fn in_the_place_of(
 /// If a function of the user raises.
 pub fn beside_on(
     system: &dyn PiecewiseSystem,
-    place: &Place<'_>,
+    (place, units): (&Place<'_>, Units<'_>),
     j: usize,
     distance: f64,
 ) -> Result<(f64, Vec<f64>), FieldError> {
     let (&Place { t, x, signs, .. }, side) = (place, distance.signum());
-    let later = t + distance * (1.0 + t.abs());
+    let later = t + distance * units.of_time(t);
     let shifts = (0..x.len()).map(|i| distance * (1.0 + side / (2.0 + i as f64)));
-    let pairs = x.iter().zip(shifts);
-    let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
-    let mut projector = Projector::new(beside.len(), signs.len());
+    let pairs = x.iter().zip(shifts).enumerate();
+    let beside = pairs.map(|(i, (x, d))| x + d * units.of_state(i));
+    let mut beside: Vec<f64> = beside.collect();
+    let mut projector =
+        Projector::new(beside.len(), signs.len()).measured_in(units.parts(beside.len()));
     projector.project(system, j, later, &mut beside, place.setting())?;
     Ok((later, beside))
 }
@@ -166,9 +172,17 @@ pub fn normal(
     Ok(row)
 }
 
-/// Are two normals the same, up to their lengths, or is one zero?
-pub fn parallel(one: &[f64], other: &[f64]) -> bool {
-    are_parallel(dot(one, other), dot(one, one) * dot(other, other))
+/// Are two normals the same, up to their lengths, or is one zero? In the user's units, and in those of the states.
+pub fn parallel(one: &[f64], other: &[f64], place: &Place<'_>, units: Units<'_>) -> bool {
+    let in_units = |row: &[f64]| -> Vec<f64> {
+        let sizes = (0..place.x.len()).map(|i| units.of_state(i));
+        let sizes = sizes.chain([units.of_time(place.t)]);
+        row.iter().zip(sizes).map(|(v, size)| v * size).collect()
+    };
+    let are_same = |one: &[f64], other: &[f64]| {
+        are_parallel(dot(one, other), dot(one, one) * dot(other, other))
+    };
+    are_same(one, other) && are_same(&in_units(one), &in_units(other))
 }
 
 /// The same, from the product of the normals and that of their squares.

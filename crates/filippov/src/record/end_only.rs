@@ -119,6 +119,7 @@ impl EndOnly {
             t_last: times[1],
             sliding: self.sliding,
             is_projected: self.is_projected,
+            units: Vec::new(),
             mode: self.mode.clone(),
             discrete: Vec::new(),
             sides: Vec::new(),

@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
+use crate::error_scale::Units;
 use crate::event::{UserEvent, UserEvents, UserZero, TICK};
 use crate::mode::Mode;
 use crate::motion::{CurrentMotion, Guard, Run};
@@ -554,6 +555,7 @@ impl<'a> Recorder<'a> {
             t_last,
             sliding: options.sliding,
             is_projected: options.stabilization == Stabilization::Projection,
+            units: Units::from(options).parts(self.n),
             mode,
             discrete,
             sides,

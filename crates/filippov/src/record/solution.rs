@@ -57,6 +57,8 @@ pub struct Solution {
     pub sliding: SlidingRule,
     /// Are sliding motions on their surfaces by projection?
     pub is_projected: bool,
+    /// The units in which states are moved onto surfaces; empty: one for all.
+    pub(crate) units: Vec<f64>,
     /// The mode at the end.
     pub mode: Mode,
     /// The discrete states at the end.
@@ -137,7 +139,8 @@ impl Solution {
         if mode.codimension() > 0 && self.is_projected {
             let (set, signs) = (mode.sliding_set().collect::<Vec<_>>(), mode.signs());
             let setting = Setting::new(&signs, &discrete);
-            let mut projector = Projector::new(n, system.n_surfaces());
+            let projector = Projector::new(n, system.n_surfaces());
+            let mut projector = projector.measured_in(self.units.clone());
             projector.project_onto_rates(system, &set, t, y, setting)?;
         }
         Ok(Some(mode))

@@ -158,8 +158,8 @@ pub const STEADY_ROUNDS: f64 = 0.99;
 /// part of its speed: the mean of a round differs by a multiple of its size, and another mean by a multiple of the speed.
 pub const SAME_MEAN: f64 = 1e-3;
 
-/// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
-/// of zero.
+/// The square of the distance from which accumulating switches are extrapolated is at least this part of that of the size of the
+/// states, also for a tolerance of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;
 
 /// Surfaces slid on whose multipliers are bounded over a step: for more, m 2^m bounds cost more than samples.

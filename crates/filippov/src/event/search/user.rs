@@ -160,6 +160,16 @@ impl StepSearch<'_, '_> {
             }
         };
         let function = events.events[index].function;
+        if let Some((j, sense)) = function.surface() {
+            if let Some(is_reached) = self.reaches(j, events) {
+                let side = sense * f64::from(self.run.motion.mode.entries()[j]);
+                if is_reached {
+                    add(theta, side);
+                }
+                events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
+                return Ok(true);
+            }
+        }
         let &Interpolant { t0, dt, .. } = self.stepper.interpolant();
         // It is not known where a motion went on from within a step.
         let left = match events.left[index] {
@@ -217,6 +227,17 @@ impl StepSearch<'_, '_> {
             .for_each(|change| add(change.at, change.before));
         events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
         Ok(true)
+    }
+
+    /// Does the motion arrive at a surface at the end of the step? `None` if nothing looks for that.
+    fn reaches(&self, j: usize, events: &UserEvents) -> Option<bool> {
+        let motion = &self.run.motion;
+        if motion.mode.entries()[j] == 0 || motion.resting.contains(&j) {
+            return Some(false);
+        }
+        let arrives_at = events.arrives_at.as_ref();
+        let is_reached = arrives_at.map(|surfaces| surfaces.contains(&j));
+        is_reached.filter(|_| motion.looks_for(j))
     }
 
     /// Adds the zeros of a switching function to the cuts; false if a shorter step is needed.
