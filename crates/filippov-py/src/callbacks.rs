@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use filippov::action::ActionMap;
 use filippov::{
-    AffinePart, FieldError, Held, Piece, PiecewiseSystem, Place, Setting, SignStructure,
+    AffinePart, FieldError, Held, Piece, PiecewiseSystem, Place, Setting, Side, SignStructure,
     SmoothParts, TracedSystem, UserFunction,
 };
 use filippov_expr::{
-    Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
+    Backend, Enclosure, EnclosureProgram, ExprError, Graph, Interval, Motion, NodeId, Program,
 };
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -374,11 +374,69 @@ impl TracedEvent {
 /// An expression along a motion: a quantity that a user asks for.
 pub struct Signal<'a> {
     pub expression: &'a EventExpression,
+    /// The velocity of the states, if it is known, and the limit that is meant where the quantity jumps.
+    pub velocity: Option<&'a [f64]>,
+    pub side: Side,
     /// The surfaces whose contact accelerations it reads behind the states.
     pub contacts: &'a [usize],
 }
 
+/// A point of a motion, and its velocity; that of what stands behind the states is not known.
+struct Passing<'p> {
+    t: f64,
+    x: &'p [f64],
+    velocity: &'p [f64],
+}
+
+impl Motion for Passing<'_> {
+    fn time(&self) -> Interval {
+        Interval::point(self.t)
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        Enclosure {
+            value: Interval::point(self.x[index]),
+            rate: match self.velocity.get(index) {
+                Some(rate) => Interval::point(*rate),
+                None => Enclosure::UNKNOWN.rate,
+            },
+        }
+    }
+}
+
 impl Signal<'_> {
+    /// The sign of an inner part with this value. One that is zero up to rounding has that of the limit, if it changes there.
+    fn sign_of(
+        &self,
+        part: &EventPart,
+        value: f64,
+        (t, x, signs): (f64, &[f64], &[f64]),
+        p: &[f64],
+    ) -> f64 {
+        let of_value = if value == 0.0 { 0.0 } else { value.signum() };
+        let Some(velocity) = self.velocity else {
+            return of_value;
+        };
+        let passing = Passing { t, x, velocity };
+        let mut bound = [Enclosure::UNKNOWN];
+        self.expression
+            .with_levels_along((&passing, signs), p, |p| {
+                part.enclosing.eval(&passing, signs, p, &mut bound);
+            });
+        let [Enclosure { value, rate }] = bound;
+        let is_zero = value.lo <= 0.0 && value.hi >= 0.0;
+        let rises = match () {
+            () if rate.lo > 0.0 => 1.0,
+            () if rate.hi < 0.0 => -1.0,
+            () => return of_value,
+        };
+        match self.side {
+            _ if !is_zero => of_value,
+            Side::Right => rises,
+            Side::Left => -rises,
+        }
+    }
+
     /// The value at a point of a motion. The surfaces slid on, with their multipliers, count with the weights of both of their
     /// sides; a surface in contact is zero.
     pub fn value(&self, (t, y): (f64, &[f64]), p: &[f64], piece: &Piece, held: &Held) -> f64 {
@@ -409,13 +467,14 @@ impl Signal<'_> {
                 let Some(&j) = inside.get(inner.len()) else {
                     continue;
                 };
-                let own = match out[0] == 0.0 || of_contact(j).is_some() {
-                    true => 0.0,
-                    false => out[0].signum(),
+                let own = || match of_contact(j) {
+                    Some(_) => 0.0,
+                    None => self.sign_of(part, out[0], (t, &x, &signs), &p),
                 };
                 let slid = sliding.iter().position(|s| s.0 == j).map(sign);
                 let entry = piece.mode.entries().get(j).filter(|entry| **entry != 0);
-                inner.push(slid.or(entry.map(|&entry| f64::from(entry))).unwrap_or(own));
+                let held = slid.or(entry.map(|&entry| f64::from(entry)));
+                inner.push(held.unwrap_or_else(own));
             }
             total += weight * out[0];
         }

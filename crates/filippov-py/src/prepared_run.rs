@@ -7,7 +7,7 @@ use filippov::derivative::{Extension, Growth};
 use filippov::section::Section;
 use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Laws,
-    Options, Piece, Problem, Reached, Solution, TracedMap, UserEvent, UserFunction,
+    Options, Piece, Problem, Reached, Setting, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
@@ -205,6 +205,17 @@ impl PreparedRun {
             (Some(laws), Some(system)) => laws.follow_idle(system, at, &mut piece.discrete),
             _ => Ok(()),
         }
+    }
+
+    /// The velocity of a motion that does not slide, if its field has a value.
+    pub fn velocity_in_region(&self, piece: &Piece, (t, x): (f64, &[f64])) -> Option<Vec<f64>> {
+        if piece.mode.codimension() > 0 {
+            return None;
+        }
+        let (signs, mut velocity) = (piece.mode.signs(), vec![0.0; x.len()]);
+        let place = Setting::new(&signs, &piece.discrete).at(t, x);
+        let known = self.core.field(&place, &mut velocity);
+        known.ok().map(|()| velocity)
     }
 
     /// The system with its parameters, if it is traced.

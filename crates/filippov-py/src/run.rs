@@ -482,10 +482,11 @@ impl Run {
         let (solution, side) = (self.solution(), side_of(left));
         let (system, actions) = (&**self.system(), self.prepared.actions());
         let mut y = vec![0.0; solution.n_states];
-        let mut out = Vec::new();
+        let (mut velocity, mut out) = (y.clone(), Vec::new());
         for &t in t.as_slice()? {
             let found = solution.evaluate(system, t, side, &mut y).map_err(raised)?;
             found.ok_or_else(|| outside(&solution, t))?;
+            let rate = solution.rate(t, side, &mut velocity);
             let piece = solution.piece_at(system, t, side).map_err(raised)?;
             let mut piece = piece.unwrap_or_default();
             let followed = self.prepared.follow_idle(&mut piece, (t, &y));
@@ -493,6 +494,8 @@ impl Run {
             let held = piece.held(system, &actions, solution.sliding, (t, &y));
             let signal = Signal {
                 expression: &expression.expression,
+                velocity: rate.map(|()| &velocity[..]),
+                side,
                 contacts: &contacts,
             };
             out.push(signal.value((t, &y), p.as_slice()?, &piece, &held.map_err(raised)?));
@@ -514,8 +517,11 @@ impl Run {
         followed.map_err(raised)?;
         let actions = self.prepared.actions();
         let held = piece.held(&**self.system(), &actions, solution.sliding, at);
+        let velocity = self.prepared.velocity_in_region(&piece, at);
         let signal = Signal {
             expression: &expression.expression,
+            velocity: velocity.as_deref(),
+            side: Side::Right,
             contacts: &contacts,
         };
         Ok(signal.value(at, p.as_slice()?, &piece, &held.map_err(raised)?))

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
 use filippov::{
-    message_of, Error, Kind, Piece, Reached, SlidingRule, Solution, Stop, UserFunction, Warning,
-    WarningCode,
+    message_of, Error, Kind, Piece, Reached, Side, SlidingRule, Solution, Stop, UserFunction,
+    Warning, WarningCode,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
@@ -136,10 +136,13 @@ impl Signals<'_> {
     ) -> Vec<f64> {
         let followed = run.follow_idle(&mut piece, (t, y));
         let held = followed.and_then(|()| piece.held(&**run.core(), &run.actions(), rule, (t, y)));
+        let velocity = run.velocity_in_region(&piece, (t, y));
         let value = |output: &Output| match &held {
             Ok(held) => {
                 let signal = Signal {
                     expression: &output.expression,
+                    velocity: velocity.as_deref(),
+                    side: Side::Right,
                     contacts: &output.contacts,
                 };
                 signal.value((t, y), self.p, &piece, held)

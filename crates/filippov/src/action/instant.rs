@@ -5,7 +5,7 @@
 //! 1. At one instant the actions whose time has come and those whose surface was reached in their direction are
 //!    done in the order of the list, each on the state that the one before it left; then those that follow every jump.
 //! 2. Then those are done that the jump triggered: it led across their surface in their direction, or onto it with
-//!    a motion that approaches it. This is repeated until there are none.
+//!    a motion that approaches it; or onto it, where the function reads discrete states alone. This is repeated until there are none.
 //! 3. An action whose state still moves through its surface is not done again in that instant: the motion
 //!    crosses. (A count, or a phase that is set back, at a section.)
 //! 4. The mode is decided for the last state ([`crate::decisions`]).
@@ -85,7 +85,7 @@ impl<'a> Instant<'_, 'a> {
                 }
             }
             self.push_back(&before)?;
-            due = self.triggered_by_jump(&due, &mut approach)?;
+            due = self.triggered_by_jump(&due, &start, &mut approach)?;
         }
         if let Some(j) = self.penetrates(&before, &start, &approach)? {
             return Ok(Some(Stop::Contact { surfaces: vec![j] }));
@@ -246,6 +246,7 @@ impl<'a> Instant<'_, 'a> {
     fn triggered_by_jump(
         &mut self,
         done: &[usize],
+        start: &Values,
         approach: &mut Approach,
     ) -> Result<Vec<usize>, FieldError> {
         let before = self.run.motion.mode.clone();
@@ -276,13 +277,20 @@ impl<'a> Instant<'_, 'a> {
             if !on_surface[j] {
                 let now = mode.entries()[j];
                 // The jump of its own action may complete the passage that triggered it.
-                if now != side && !was_done {
+                let is_new = start[j] != 0.0 || !self.is_steady(j, &mode)?;
+                if now != side && !was_done && is_new {
                     due.extend(actions.triggered_at(j, side));
                 }
                 (approach.side[j], approach.passes[j]) = (now, false);
                 continue;
             }
-            if !self.goes_through(j, side, &mode, &on_surface)? {
+            if self.is_steady(j, &mode)? {
+                // No motion leads on from there: the jump has reached the surface, once.
+                if start[j] != 0.0 && !was_done && !approach.passes[j] {
+                    due.extend(actions.triggered_at(j, side));
+                    approach.passes[j] = true;
+                }
+            } else if !self.goes_through(j, side, &mode, &on_surface)? {
                 approach.passes[j] = false;
             } else if !approach.passes[j] {
                 due.extend(actions.triggered_at(j, side));
@@ -291,6 +299,15 @@ impl<'a> Instant<'_, 'a> {
         due.sort_unstable();
         due.dedup();
         Ok(due)
+    }
+
+    /// Does a switching function read discrete states alone, so that no motion changes it?
+    fn is_steady(&self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+        let (run, signs) = (&self.run, mode.signs());
+        let place = run.motion.setting().with_signs(&signs).at(run.t, &run.x);
+        let mut gradient = vec![0.0; run.x.len()];
+        let rate = run.system.gradient(j, &place, &mut gradient)?;
+        Ok(rate == 0.0 && gradient.iter().all(|g| *g == 0.0))
     }
 
     /// The sides of a mode; where it is in contact, the free side.

@@ -201,6 +201,7 @@ impl StepSearch<'_, '_> {
                     add(at, side);
                     side = -side;
                 }
+                let side = if left == 0.0 && value == 0.0 { 0.0 } else { side };
                 events.at_end.borrow_mut()[index] = AtEnd { side, value };
                 return Ok(true);
             }
@@ -300,6 +301,14 @@ impl StepSearch<'_, '_> {
             true => self.first_sign_behind(along, from, to)?,
             false => sign_of(value),
         };
+        if sign == 0.0 && before.may_have_jumped && before.before != 0.0 && !before.is_known_zero {
+            // It has jumped to zero, and stays there.
+            changes.push(Change {
+                at: from,
+                before: before.before,
+                after: 0.0,
+            });
+        }
         let sign = if sign == 0.0 { before.before } else { sign };
         if before.before * sign < 0.0 && !before.is_known_zero {
             changes.push(Change {
@@ -340,8 +349,9 @@ impl StepSearch<'_, '_> {
             if !self.search_piece_of(&along, &mut start, (to, theta, kink), &mut changes)? {
                 return Ok(None);
             }
+            let stays_zero = changes.last().is_some_and(|change| change.after == 0.0);
             before = AtStart {
-                before: start.sign,
+                before: if stays_zero { 0.0 } else { start.sign },
                 is_known_zero: false,
                 may_have_jumped: false,
             };
