@@ -229,7 +229,13 @@ impl<'a> Integrator<'a> {
         {
             return self.begin(next, &event.multiple);
         }
+        let due = self.triggered_by_a_sign(&before, &next.mode, &concerned);
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
+        if !due.is_empty() {
+            let (system, t) = (self.run.system, self.run.t);
+            self.run.motion.restart(system, t, next.mode, &[]);
+            return self.act(due);
+        }
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
             // One surface meets no other, but perhaps its rate.
             let is_of_higher_degree = |j: usize| self.run.system.reduced(&[j]).is_some();
@@ -249,6 +255,24 @@ impl<'a> Integrator<'a> {
             }
         }
         self.begin(next, &event.multiple)
+    }
+
+    /// The actions at surfaces whose functions jump through zero with the sign of another one: that of a floor, or of a branch.
+    fn triggered_by_a_sign(&self, before: &Mode, after: &Mode, reached: &[usize]) -> Vec<usize> {
+        let actions = self.run.actions;
+        if actions.list.is_empty() || !self.run.system.has_nested_signs() {
+            return Vec::new();
+        }
+        let triggers = self.run.motion.triggers(self.run.system);
+        let sides = before.entries().iter().zip(after.entries()).enumerate();
+        let jumps = sides.filter(|(j, (side, now))| {
+            **side * **now == -1 && !reached.contains(j) && !triggers.is_internal(*j)
+        });
+        let due = jumps.flat_map(|(j, (side, _))| actions.triggered_at(j, *side));
+        let mut due: Vec<usize> = due.collect();
+        due.sort_unstable();
+        due.dedup();
+        due
     }
 
     /// After too many switches without any progress of time: goes on from their limit, or ends the run.
