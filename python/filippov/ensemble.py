@@ -282,7 +282,11 @@ def run_ensemble(
         )
         if raised is not None:
             break
-        progress.add(len(runs) - first, int(np.count_nonzero(runs.status[first:] < 0)))
+        try:
+            progress.add(len(runs) - first, int(np.count_nonzero(runs.status[first:] < 0)))
+        except BaseException as error:  # raised by a progress function
+            raised = error
+            break
     progress.close()
     ensemble = Ensemble(
         runs,
@@ -303,6 +307,7 @@ def run_ensemble(
             partial=ensemble,
         )
     if raised is not None:
+        raised.partial = ensemble  # type: ignore[attr-defined]
         raise raised
     if ensemble.n_warnings.any():
         _show_warnings(ensemble)

@@ -30,6 +30,7 @@ from filippov.resets import Reset
 from filippov.solution import Solution
 from filippov.switches import Borders, borders_of
 from filippov.system import System
+from filippov.trace.fingerprint import Fingerprint, fingerprint
 from filippov.trace.tracer import Trace, trace_output
 from filippov.unknown import did_you_mean
 
@@ -87,7 +88,7 @@ def gradient(
         repeated piece by piece on the way back, from checkpoints: its gradient is the same to the bit. Zeros
         of events, and states at the instants of costs, are kept in any case.
     **options
-        Other options of `solve_ivp`, for example ``rtol``.
+        Other options of `solve_ivp`, for example ``rtol``, and parameter values by name.
 
     Returns
     -------
@@ -124,6 +125,7 @@ def gradient(
     t0, t1 = check_t_span(t_span)
     if t0 == t1:
         raise InputError("t_span: a run of no length has no gradient")
+    params = system.take_named(params, options)
     values = system.parameter_values(params)
     start = check_y0(y0, states=system._states)
     n = len(start)
@@ -167,6 +169,7 @@ def gradient(
         else:
             for t in part.times:
                 total.add(part.name, part.cost, float(t))
+                warn_user(_at_switch(sol, part.name, t))
     value, found, lost, borders = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
@@ -247,6 +250,15 @@ def _refuse_untraced(running: Cost, trace: Trace | None, values: Mapping[str, fl
         raise InputError(f"running: its derivative is not known: {found}")
 
 
+def _at_switch(sol: Solution, name: str, t: float) -> list[str]:
+    """Return a warning if the motion has a corner or a jump at an instant of a cost."""
+    for k in np.flatnonzero(np.abs(sol.switches.t - t) <= 4.0 * np.spacing(abs(t))).tolist():
+        switch = sol.switches[k]
+        if switch.kind not in ("clock", "grazing") and not switch.is_kink:
+            return [f"{name}: the run switches at the instant t = {t:.6g}: the gradient is that of one side"]
+    return []
+
+
 def _has_ended(sol: Solution, k: int) -> bool:
     """Return whether the run ended at an event of this number."""
     times = (sol.t_events or [])[k]
@@ -280,13 +292,13 @@ def _with_integral(terminal: Cost | None, n: int) -> Cost:
     return final
 
 
-_extended: WeakKeyDictionary[System, tuple[Cost, System]] = WeakKeyDictionary()
+_extended: WeakKeyDictionary[System, tuple[Fingerprint, System]] = WeakKeyDictionary()
 
 
 def _with_running_cost(system: System, running: Cost, n: int) -> System:
     """Return the system with the integral of the running cost as its last state; the latest one is kept."""
-    known = _extended.get(system)
-    if known is not None and known[0] is running:
+    known, read = _extended.get(system), fingerprint(running)
+    if known is not None and known[0] == read:
         return known[1]
     source = system._source
     if source is None:
@@ -326,7 +338,8 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
         system.params,
         (*system.state_names(n), _RUNNING),
     )
-    _extended[system] = (running, extended)
+    if read is not None:
+        _extended[system] = (read, extended)
     return extended
 
 
@@ -368,6 +381,15 @@ class _Sum:
             hint = did_you_mean(surface, surfaces)
             raise InputError(f"{name}: there is no surface {surface!r}{hint}; the surfaces are {surfaces}")
         place = surfaces.index(surface)
+        kinds, t = self._sol.switches.kind, self._sol.switches.t
+        for k in np.flatnonzero(kinds == "accumulation").tolist():
+            if place in self._sol.switches[k].surfaces:
+                warn_user(
+                    [
+                        f"{name}: {surface} has infinitely many switches before t = {t[k]:.6g}; the cost has "
+                        "those that are recorded"
+                    ]
+                )
         self._terms.append((self._trace(name, cost), None, place, None))
         self._costs.append((name, cost))
 
@@ -389,14 +411,23 @@ class _Sum:
     def _value_of(self, named: tuple[str, Cost], t: float, y: Array, held: Iterable[float]) -> float:
         name, cost = named
         params = {**self._values, **dict(zip(self._names, map(float, held), strict=True))}
-        return _number(cost(t, y, **_named(cost, params)), name)
+        try:
+            returned = cost(t, y, **_named(cost, params))
+        except Exception as error:
+            text = f"{name} raised {type(error).__name__} at t = {t:.6g}: {error}"
+            raise ModelError(text, partial=self._sol) from error
+        return _number(returned, name)
 
     def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
         """Return a function as an expression. At a known time what it reads of the time is a number."""
         if isinstance(known := self._traced.get(function), TracedSystem):
             return known
         trace = self._sol._origin.prepared.trace
-        assert trace is not None
+        if trace is None:
+            raise InputError(
+                f"{name}: a cost needs the functions of the system, which a copy, or one that was read from "
+                "a file, does not have"
+            )
         own = selective(function, dict(self._values))
         found = known or trace_output(trace, own)
         self._traced[function] = found

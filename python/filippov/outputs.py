@@ -31,6 +31,7 @@ __all__ = [
     "at_ends",
     "check_outputs",
     "contacts_of",
+    "outputs_of",
     "refuse_outputs_that_fail",
     "traced_outputs",
 ]
@@ -122,6 +123,30 @@ def along(
             for (t, x, contact), own in zip(points, known, strict=True)
         ]
     )
+
+
+class _NotKept(dict[str, Array]):
+    """The outputs of a solution that was not kept as a function, at other times than its end."""
+
+    def __missing__(self, name: str) -> Array:
+        raise ModelError(
+            f"outputs: {name!r} is known where the solution is kept as a function: solve with "
+            "dense_output=True, and without keep="
+        )
+
+
+def outputs_of(solution: Solution, origin: Any) -> dict[str, Array]:
+    """Return the outputs at the times of a solution; of one that is no function, at its end alone."""
+    functions = origin.system.outputs
+    if solution.sol is not None:
+        return {name: solution.evaluate(fun) for name, fun in functions.items()}
+    run, values = solution._run, origin.values
+    if not isinstance(run, Run) or solution.t.tolist() != [run.t_last]:
+        return _NotKept()
+    members = [(origin.prepared, run, origin.system.parameter_values(None) if values is None else values)]
+    return {
+        name: at_ends(origin.system, fun, f"the output {name!r}", members) for name, fun in functions.items()
+    }
 
 
 def at_ends(

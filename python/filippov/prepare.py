@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from filippov._core import OpaqueSystem, Run, SignedSystem, TracedSystem
 from filippov.errors import InputError, ModelError, TraceError
-from filippov.events import bind_function, check_scalar_function, function_name, selective
+from filippov.events import bind_function, call_once, check_scalar_function, function_name, selective
 from filippov.forms import Source
 from filippov.laws import without_memory
 from filippov.resets import CoreAction, Reset, check_map_value
@@ -354,7 +354,7 @@ def _prepare_opaque(
 def _check_map(bound: Callable[..., Any], n: int, t0: float, y0: Array, what: str) -> None:
     """Refuse a map that does not return `n` real numbers, or that has a memory."""
     with without_memory(f"{what}: {NO_MEMORY_IN_A_MAP}"):
-        value = bound(t0, y0.copy())
+        value = call_once(bound, t0, y0, f"{what}: map")
     check_map_value(value, n, what)
 
 

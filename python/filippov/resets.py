@@ -112,6 +112,10 @@ class Reset:
             raise InputError(f"resets: map is a function map(t, y), not {type(map).__name__}")
         if sum(given is not None for given in (h, times, period)) != 1:
             raise InputError("resets: one of h, times and period says when the reset happens")
+        for argument, value, belongs in (("phase", phase, period), ("direction", direction, h)):
+            if belongs is None and value not in (0.0, "both"):
+                to = "period" if argument == "phase" else "h"
+                raise InputError(f"resets: {argument} belongs to a reset with {to}, which is not given")
         if h is not None and not callable(h):
             raise InputError(f"resets: h is a function h(t, x), not {type(h).__name__}")
         self.h = h

@@ -7,12 +7,14 @@ Everything is checked before it is used, and nothing in it is ever executed.
 from __future__ import annotations
 
 import os
+import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from filippov._core import TracedSystem, load_system, save_system
+from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
 from filippov.forms import Source
 from filippov.prepare import Prepared
@@ -204,16 +206,35 @@ class Saving(ABC):
             for name in ("_prepared", "_calls", "_source", "_params", "_states", "_n"):
                 state.pop(name)
             state["_packed"] = packed(prepared, self._params)
+        state["_outputs"] = _that_travel(self._outputs)
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        data = state.pop("_packed", None)
+        data, outputs = state.pop("_packed", None), state.get("_outputs", {})
         self.__dict__.update(state)
         if data is not None:
             try:
                 self._restore(*data)
             except ValueError as error:
                 raise InputError(f"a pickled system: {error}") from None
+            self._outputs = outputs
+
+
+def _that_travel(outputs: Mapping[str, Callable[..., Any]]) -> dict[str, Callable[..., Any]]:
+    """Return the outputs whose functions can be pickled; a warning names the others."""
+    kept = {}
+    for name, fun in outputs.items():
+        try:
+            pickle.dumps(fun)
+        except (pickle.PicklingError, AttributeError, TypeError):
+            continue
+        kept[name] = fun
+    left = [name for name in outputs if name not in kept]
+    if left:
+        warn_user(
+            [f"the outputs {', '.join(left)} stay behind: their functions cannot be imported elsewhere"]
+        )
+    return kept
 
 
 def _path(path: Any) -> Path:

@@ -126,7 +126,7 @@ class DenseSolution:
         times = np.asarray(t, dtype=np.float64)
         flat = np.atleast_1d(times)
         self._check_range(flat)
-        values = self._run.multipliers(np.ascontiguousarray(flat))
+        values = self._run.multipliers(np.ascontiguousarray(flat)).reshape(-1, len(flat))
         return values[:, 0] if times.ndim == 0 else values
 
     def __repr__(self) -> str:
@@ -749,7 +749,9 @@ class Solution:
     @cached_property
     def outputs(self) -> dict[str, Array]:
         """The outputs of the system at the times `t`, by name."""
-        return {name: self.evaluate(fun) for name, fun in self.output_functions.items()}
+        from filippov.outputs import outputs_of
+
+        return outputs_of(self, self._origin) if hasattr(self, "_origin") else {}
 
     @property
     def output_names(self) -> tuple[str, ...]:

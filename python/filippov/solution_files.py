@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +85,7 @@ def read_solution(path: str | os.PathLike[str]) -> dict[str, Any]:
         text = json.loads(str(arrays.pop("text")))
         if text.get("format") != FORMAT:
             raise KeyError("format")
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{what}: no file of a solution, or a damaged one ({error})") from None
     if text["version"] != VERSION:
         raise InputError(

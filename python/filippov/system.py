@@ -337,10 +337,7 @@ class System(Points, Saving):
         -------
         Solution
         """
-        if self._params:
-            named = {name: options.pop(name) for name in self._params if name in options}
-            params = {**(params or {}), **named}
-        return _solver()(self, t_span, y0, params, options)
+        return _solver()(self, t_span, y0, self.take_named(params, options), options)
 
     def ensemble(
         self,
@@ -367,9 +364,9 @@ class System(Points, Saving):
         threads : int, optional
             Number of threads; by default one per core. The results do not depend on it, to the bit.
         **options
-            Options of `solve_ivp`; `keep` is ``"last"`` by default. ``progress`` is a bar, or a function of
-            the number of runs done, of all, and of those that failed. With `wrt`, `Ensemble.derivative` has
-            the derivatives of all members.
+            Options of `solve_ivp`, and parameter values by name; `keep` is ``"last"`` by default.
+            ``progress`` is a bar, or a function of the number of runs done, of all, and of those that failed.
+            With `wrt`, `Ensemble.derivative` has the derivatives of all members.
 
         Returns
         -------
@@ -387,7 +384,7 @@ class System(Points, Saving):
         """
         from filippov.ensemble import run_ensemble
 
-        return run_ensemble(self, t_span, y0, params, events, threads, options)
+        return run_ensemble(self, t_span, y0, self.take_named(params, options), events, threads, options)
 
     def regularize(self, eps: float, kind: str = "tanh", kappa: npt.ArrayLike | None = None) -> System:
         """Return the regularised system: a smooth function of ``u = kappa h / eps`` for the sign of every h.
@@ -471,6 +468,13 @@ class System(Points, Saving):
             if name not in self._params:
                 raise InputError(f"params: {self.no_parameter(name)}")
         return {**self._params, **changes}
+
+    def take_named(self, params: Mapping[str, Any] | None, options: dict[str, Any]) -> Any:
+        """Return `params` with the parameters among some options, which are taken from these."""
+        named = {name: options.pop(name) for name in self._params if name in options}
+        if not named or not isinstance(params, Mapping | None):
+            return params
+        return {**(params or {}), **named}
 
     def no_parameter(self, name: str) -> str:
         """Return the message for a parameter that the system does not have."""

@@ -31,6 +31,7 @@ def comparisons(problem: Problem, sol: fl.Solution, number: int) -> Iterator[str
         _permuted,
         _shifted,
         _scaled,
+        _in_other_units,
         _traced,
         _other_method,
         _euler,
@@ -118,6 +119,42 @@ def _scaled(problem: Problem, sol: fl.Solution) -> Iterator[str]:
         )
 
     yield from _same(problem, sol, run, lambda y: y)
+
+
+def _in_other_units(problem: Problem, sol: fl.Solution) -> Iterator[str]:
+    """States in units of their own, between 1e-9 and 1e9 of those of before; time in one that is as different.
+
+    The units are powers of two: nothing is rounded. The first step of a run is not the same in other units of time.
+    """
+    rng = np.random.default_rng(len(problem.source))
+    n = len(problem.y0)
+    sizes, tau = 2.0 ** rng.integers(-30, 31, n), 2.0 ** float(rng.integers(-30, 31))
+
+    def inner(function: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda t, z: function(t / tau, [z[i] / sizes[i] for i in range(n)])
+
+    def vector(function: Callable[..., Any], unit: float) -> Callable[..., Any]:
+        own = inner(function)
+        return lambda t, z: [sizes[i] / unit * value for i, value in enumerate(own(t, z))]
+
+    resets = [
+        _changed(
+            r,
+            h=r.h and inner(r.h),
+            map=vector(r.map, 1.0),
+            times=None if r.times is None else r.times * tau,
+            period=None if r.period is None else r.period * tau,
+            phase=r.phase * tau,
+        )
+        for r in problem.resets
+    ]
+    options = {**LIMITS, **problem.options, "atol": problem.tolerance * sizes}
+
+    def run(y0: Array) -> fl.Solution:
+        rhs = vector(problem.rhs, tau)
+        return fl.solve_ivp(rhs, (0.0, problem.t_end * tau), y0 * sizes, resets=resets, **options)
+
+    yield from _same(problem, sol, run, lambda y: y / sizes, METHODS_APART)
 
 
 def _traced(problem: Problem, sol: fl.Solution) -> Iterator[str]:

@@ -78,6 +78,8 @@ impl ErrorScale {
 #[derive(Clone, Copy, Debug)]
 pub struct Units<'a> {
     atol: &'a [f64],
+    /// The largest of them.
+    most: f64,
     /// Where the absolute tolerance governs the error, for the largest one.
     floor: f64,
     /// The state.
@@ -90,9 +92,11 @@ pub struct Units<'a> {
 
 impl<'a> From<&'a Options> for Units<'a> {
     fn from(options: &'a Options) -> Self {
-        let floor = largest_of(&options.atol) / options.rtol;
+        let most = options.atol.iter().fold(0.0, |most: f64, a| most.max(*a));
+        let floor = most / options.rtol;
         Units {
             atol: &options.atol,
+            most,
             floor,
             least: if floor > 0.0 { floor } else { 1.0 },
             ..Units::ONES
@@ -104,6 +108,7 @@ impl<'a> Units<'a> {
     /// Those of a system whose states and times are about 1.
     pub const ONES: Units<'static> = Units {
         atol: &[],
+        most: 1.0,
         floor: 1.0,
         x: &[],
         least: 1.0,
@@ -157,14 +162,10 @@ impl<'a> Units<'a> {
 
     fn part(&self, i: usize) -> f64 {
         match self.atol.get(i) {
-            Some(atol) if *atol > 0.0 && self.atol.len() > 1 => atol / largest_of(self.atol),
+            Some(atol) if *atol > 0.0 && self.atol.len() > 1 => atol / self.most,
             _ => 1.0,
         }
     }
-}
-
-fn largest_of(atol: &[f64]) -> f64 {
-    atol.iter().fold(0.0, |most: f64, atol| most.max(*atol))
 }
 
 #[inline(always)]

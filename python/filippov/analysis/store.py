@@ -157,6 +157,7 @@ class Store:
         columns["messages"] = np.frombuffer(json.dumps(texts).encode(), dtype=np.uint8)
         columns["carry"] = carry
         columns["sweep"] = np.array(self._digest)
+        columns["place"] = np.array(index)
         buffer = BytesIO()
         np.savez(buffer, **columns)  # type: ignore[arg-type]
         data = buffer.getvalue()
@@ -204,6 +205,8 @@ class Store:
             raise ValueError("its checksum differs")
         with np.load(BytesIO(data), allow_pickle=False) as file:
             sweep = str(file["sweep"])
+            if "place" in file and int(file["place"]) != int(path.stem):
+                raise ValueError("it has the points of another chunk")
             table = {name: file[name] for name in names or (*COLUMNS, "carry")}
             if "message" in table:
                 texts = [sys.intern(text) for text in json.loads(file["messages"].tobytes())]

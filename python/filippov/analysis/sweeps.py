@@ -12,7 +12,7 @@ from filippov.analysis.dataset import REASONS, dataset_of, kinds_of
 from filippov.analysis.grid import check_size, grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
-from filippov.analysis.plan import Plan, plan_of
+from filippov.analysis.plan import Piece, Plan, plan_of
 from filippov.analysis.points import Table, concatenate, prepare_for
 from filippov.analysis.schedule import as_executor, count_points, run_pieces
 from filippov.ensemble import check_threads
@@ -278,10 +278,11 @@ def run_plan(
         run_pieces(
             plan, pieces, range(len(pieces)), carries.__getitem__, take, tables.__setitem__, executor, count
         )
+    except Exception as error:  # raised by a progress function, or by one of the model
+        error.partial = _partial(plan, pieces, tables)  # type: ignore[attr-defined]
+        raise
     except KeyboardInterrupt:
-        for index, piece in enumerate(pieces):
-            tables[index] = tables[index] or plan.left_out(piece)
-        partial = _dataset(plan, tables)
+        partial = _partial(plan, pieces, tables)
         done = int(np.count_nonzero(partial.reason.values < REASONS.index("not_run")))
         raise Interrupted(
             f"{done} of {plan.n_points} points were begun; what was computed is in `partial` of this "
@@ -291,6 +292,12 @@ def run_plan(
     finally:
         bar.close()
     return _dataset(plan, tables)
+
+
+def _partial(plan: Plan, pieces: list[Piece], tables: list[Table | None]) -> Any:
+    """Return the Dataset of what was computed; the points that were not begun have the reason ``not_run``."""
+    pairs = zip(pieces, tables, strict=True)
+    return _dataset(plan, [table or plan.left_out(piece) for piece, table in pairs])
 
 
 def _dataset(plan: Plan, tables: list[Table | None]) -> Any:

@@ -55,7 +55,12 @@ impl Timetable {
     pub fn take(&mut self, actions: &Actions, t: f64) -> Vec<usize> {
         let mut due = Vec::new();
         for row in &mut self.rows {
-            if row_time(row, actions).is_some_and(|time| time <= t + SAME_TICK * t.abs()) {
+            let is_near =
+                row_time(row, actions).is_some_and(|time| time <= t + SAME_TICK * t.abs());
+            // Near zero a time says little of its rounding.
+            let is_tick =
+                || matches!(row.1, Pending::Tick(clock, next) if clock.tick_at(t) == Some(next));
+            if is_near || is_tick() {
                 due.push(row.0);
                 match &mut row.1 {
                     Pending::Times(next) => *next += 1,

@@ -6,6 +6,7 @@ use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::event::{Found, UserEvent};
+use crate::tolerances::AT_SIDE;
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +64,8 @@ pub(crate) struct UserEvents<'a> {
     pub arrives_at: Option<SmallVec<[usize; 2]>>,
     /// Have they changed where the motion began? Every function may have jumped there.
     pub may_have_jumped: bool,
+    /// Which of them have jumped from a value that is not zero to zero there.
+    pub jumped_to_zero: Vec<bool>,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
     pub zeros: Vec<Vec<UserZero>>,
@@ -89,6 +92,7 @@ impl<'a> UserEvents<'a> {
             end: StepEnd::GoesOn,
             arrives_at: Some(SmallVec::new()),
             may_have_jumped: false,
+            jumped_to_zero: vec![false; d],
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
@@ -114,6 +118,8 @@ impl<'a> UserEvents<'a> {
             if self.sides[k] == 0.0 && now != before {
                 self.last[k] = f64::NAN;
             }
+            // One that has come to zero on the way is within rounding of it.
+            self.jumped_to_zero[k] = now == 0.0 && before.abs() > AT_SIDE * self.before[k].abs();
             self.left[k] = now;
         }
         self.may_have_jumped = self.end == StepEnd::Law || self.q != q;
@@ -142,6 +148,7 @@ impl<'a> UserEvents<'a> {
             sides: self.sides.clone(),
             at_end: self.at_end.clone(),
             q: self.q.clone(),
+            jumped_to_zero: self.jumped_to_zero.clone(),
             arrives_at: self.arrives_at.clone(),
             last: self.last.clone(),
             zeros: vec![Vec::new(); self.zeros.len()],

@@ -145,7 +145,8 @@ pub fn replay_decision(
     let contact = if actions.list.is_empty() || sliding.is_empty() {
         None
     } else {
-        ContactField::new(system, actions, mode, &point.sides, &point.q)
+        let contact = ContactField::new(system, actions, mode, &point.sides, &point.q);
+        contact.map(|contact| contact.with_units(law.units))
     };
     let mut field = match contact {
         Some(contact) => ModeField::Contact(Box::new(contact)),

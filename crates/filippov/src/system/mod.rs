@@ -19,6 +19,7 @@ mod compiled;
 mod compiler;
 mod container_sections;
 mod definition;
+mod differences;
 mod enclosures;
 mod jacobian;
 mod jet_multipliers;
@@ -47,6 +48,7 @@ pub use clock::Clock;
 pub use closures::ClosureSystem;
 pub(crate) use definition::{check_index, inconsistent};
 pub use definition::{Definition, Rules};
+use differences::central;
 pub use enclosures::Enclosures;
 pub use jacobian::MotionJacobian;
 pub(crate) use jet_multipliers::{derivative_along, MultiplierEquations};
@@ -68,7 +70,6 @@ pub use traced::TracedSystem;
 
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
-use crate::tolerances::EPS;
 
 /// A piecewise-smooth system.
 ///
@@ -165,18 +166,13 @@ pub trait PiecewiseSystem: SignStructure + Sync {
         };
         let mut moved = x.to_vec();
         for i in 0..x.len() {
-            let d = EPS.cbrt() * (1.0 + x[i].abs());
-            let (up, down) = (x[i] + d, x[i] - d);
-            moved[i] = up;
-            let above = at(t, &moved)?;
-            moved[i] = down;
-            let below = at(t, &moved)?;
+            gradient[i] = central(x[i], |value| {
+                moved[i] = value;
+                at(t, &moved)
+            })?;
             moved[i] = x[i];
-            gradient[i] = (above - below) / (up - down);
         }
-        let d = EPS.cbrt() * (1.0 + t.abs());
-        let (up, down) = (t + d, t - d);
-        Ok((at(up, x)? - at(down, x)?) / (up - down))
+        central(t, |t| at(t, x))
     }
 
     /// Writes the products of the gradient of h_j with vectors of n entries that stand one after the other, and

@@ -89,6 +89,8 @@ struct AtStart {
     is_known_zero: bool,
     /// May the function, smooth as it is, have jumped there?
     may_have_jumped: bool,
+    /// It has, from a value that is not zero to zero.
+    has_jumped_to_zero: bool,
 }
 
 impl AtStart {
@@ -181,6 +183,7 @@ impl StepSearch<'_, '_> {
             before: side(left),
             is_known_zero: left == 0.0 || was_zero,
             may_have_jumped: false,
+            has_jumped_to_zero: false,
         };
         let Some(parts) = function.parts() else {
             let along = Source::Sampled(function);
@@ -201,13 +204,18 @@ impl StepSearch<'_, '_> {
                     add(at, side);
                     side = -side;
                 }
-                let side = if left == 0.0 && value == 0.0 { 0.0 } else { side };
+                let side = if left == 0.0 && value == 0.0 {
+                    0.0
+                } else {
+                    side
+                };
                 events.at_end.borrow_mut()[index] = AtEnd { side, value };
                 return Ok(true);
             }
         }
         let mut cuts = Cuts::none(parts.n_inner());
         start.may_have_jumped = events.may_have_jumped;
+        start.has_jumped_to_zero = events.may_have_jumped && events.jumped_to_zero[index];
         if parts.n_inner() > 0 || events.may_have_jumped {
             // At a kink or a jump rounding decides what the value there is: what counts is the piece before, if there is one.
             start.is_known_zero = was_zero;
@@ -255,6 +263,7 @@ impl StepSearch<'_, '_> {
             before: 0.0,
             is_known_zero: false,
             may_have_jumped: false,
+            has_jumped_to_zero: false,
         };
         let mut ignored = Vec::new();
         let along = Along::new(source, &cuts.start, self);
@@ -264,6 +273,7 @@ impl StepSearch<'_, '_> {
             before: start.sign,
             is_known_zero: start.divided,
             may_have_jumped: false,
+            has_jumped_to_zero: false,
         };
         let Some((changes, _)) = self.changes_along(source, cuts, theta, known)? else {
             return Ok(false);
@@ -301,8 +311,8 @@ impl StepSearch<'_, '_> {
             true => self.first_sign_behind(along, from, to)?,
             false => sign_of(value),
         };
-        if sign == 0.0 && before.may_have_jumped && before.before != 0.0 && !before.is_known_zero {
-            // It has jumped to zero, and stays there.
+        if sign == 0.0 && before.has_jumped_to_zero && before.before != 0.0 {
+            // It stays there.
             changes.push(Change {
                 at: from,
                 before: before.before,
@@ -354,6 +364,7 @@ impl StepSearch<'_, '_> {
                 before: if stays_zero { 0.0 } else { start.sign },
                 is_known_zero: false,
                 may_have_jumped: false,
+                has_jumped_to_zero: false,
             };
             from = to;
         }
