@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import OpaqueSystem, Run, SignedSystem, TracedSystem
-from filippov.errors import InputError, ModelError, TraceError
+from filippov.errors import FilippovError, InputError, ModelError, TraceError
 from filippov.events import bind_function, call_once, check_scalar_function, function_name, selective
 from filippov.forms import Source
 from filippov.laws import without_memory
@@ -354,7 +354,12 @@ def _prepare_opaque(
 def _check_map(bound: Callable[..., Any], n: int, t0: float, y0: Array, what: str) -> None:
     """Refuse a map that does not return `n` real numbers, or that has a memory."""
     with without_memory(f"{what}: {NO_MEMORY_IN_A_MAP}"):
-        value = call_once(bound, t0, y0, f"{what}: map")
+        try:
+            value = call_once(bound, t0, y0, f"{what}: map")
+        except InputError as error:
+            if isinstance(error.__cause__, FilippovError):
+                raise error.__cause__ from None
+            raise
     check_map_value(value, n, what)
 
 

@@ -24,21 +24,23 @@ ROUNDING_APART = 10.0  # the same steps but for rounding, which may shift one of
 
 
 def comparisons(problem: Problem, sol: fl.Solution, number: int) -> Iterator[str]:
-    """Yield the differences to one other solution; `number` says to which."""
+    """Yield the differences to one or two other solutions; `number` says to which."""
     kinds: list[Comparison] = [
         _repeated,
         _sampled,
         _permuted,
         _shifted,
         _scaled,
-        _in_other_units,
         _traced,
         _other_method,
         _euler,
     ]
-    kind = kinds[number % len(kinds)]
-    for difference in kind(problem, sol):
-        yield f"{kind.__name__[1:]}: {difference}"
+    asked = [kinds[number % len(kinds)]]
+    if number % 4 == 0:
+        asked.append(_in_other_units)
+    for kind in asked:
+        for difference in kind(problem, sol):
+            yield f"{kind.__name__[1:]}: {difference}"
 
 
 def _repeated(problem: Problem, sol: fl.Solution) -> Iterator[str]:
@@ -122,9 +124,10 @@ def _scaled(problem: Problem, sol: fl.Solution) -> Iterator[str]:
 
 
 def _in_other_units(problem: Problem, sol: fl.Solution) -> Iterator[str]:
-    """States in units of their own, between 1e-9 and 1e9 of those of before; time in one that is as different.
+    """States in units of their own, between 1e-9 and 1e9 of those of before, and time in one of its own.
 
-    The units are powers of two: nothing is rounded. The first step of a run is not the same in other units of time.
+    The units are powers of two: nothing is rounded. The first step of a run is another one in other units of
+    time.
     """
     rng = np.random.default_rng(len(problem.source))
     n = len(problem.y0)

@@ -6,7 +6,7 @@ use crate::cube::least_multipliers;
 use crate::error::FieldError;
 use crate::error::Undecided;
 use crate::mode::Mode;
-use crate::motion::Motion;
+use crate::motion::{ContactField, Motion};
 use crate::status::Stop;
 use crate::switch::Kind;
 use crate::switch::Switch;
@@ -254,7 +254,7 @@ pub(crate) fn limits_of_impacts(
     });
     let mut limits = [series, here];
     let (contact, sides) = (after.with(j, 0), at.arrival.sides);
-    let mut field = at.contact(&contact, sides);
+    let mut field = ContactField::new(at.system, at.actions, &contact, sides, at.q);
     for limit in limits.iter_mut().flatten() {
         limit.is_rest = true;
         if let Some(field) = &mut field {
@@ -309,7 +309,7 @@ pub(crate) fn limit_of_impact_rounds(
     };
     limit.is_rest = true;
     let sides = at.arrival.sides;
-    if let Some(mut field) = at.contact(&contact, sides) {
+    if let Some(mut field) = ContactField::new(at.system, at.actions, &contact, sides, at.q) {
         field.project(limit.t, &mut limit.x)?;
     }
     Ok(Some(limit))

@@ -7,8 +7,8 @@ use super::settle::place_on;
 
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
-use crate::motion::SmoothField;
 use crate::motion::{first_nonzero, Leading};
+use crate::motion::{ContactField, SmoothField};
 use crate::status::Stop;
 use crate::system::{dot, surfaces_that_matter, Action};
 use crate::tolerances::{AT_SIDE, ERRORS_OF_STEPS, FRICTION_IN_MAP, MOMENT, ROUNDING, SLOW};
@@ -359,20 +359,16 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
     };
     let impact = Impact::new(at, action, j, mode)?;
     let (moved, q) = impact.applied(at.x)?;
+    let size = dot(at.x, at.x).sqrt();
     let shift: Vec<f64> = moved.iter().zip(at.x).map(|(m, x)| m - x).collect();
-    let in_units = shift.iter().zip(&impact.sizes);
-    let distance = in_units
-        .map(|(s, size)| (s / size).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    let moves = distance > 1e-9;
+    let moves = dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size);
     if q != at.q || (moves && !leaves_point_alone(at, j, &mode.signs())?) {
         return Ok(Touching::NoContact);
     }
     let usual = impact.impulse(at.x)?;
     if moves {
         let leaves_speed = dot(&shift, &impact.normal).abs()
-            <= FRICTION_IN_MAP * distance * dot(&impact.towards, &impact.normal).sqrt();
+            <= FRICTION_IN_MAP * (dot(&shift, &shift) * dot(&impact.normal, &impact.normal)).sqrt();
         return Ok(
             match leaves_speed && impact.changes_normal_velocity(&usual) {
                 true => Touching::WithFriction(action.name.clone()),
@@ -383,7 +379,7 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
     let resting = mode.with(j, 0);
     let mut sides = at.arrival.sides.to_vec();
     sides[j] = side;
-    let Some(mut field) = at.contact(&resting, &sides) else {
+    let Some(mut field) = ContactField::new(at.system, at.actions, &resting, &sides, at.q) else {
         return Ok(Touching::NoContact);
     };
     let (mut x, mut dx) = (at.x.to_vec(), vec![0.0; at.x.len()]);
@@ -402,12 +398,11 @@ struct Impact<'p, 'm, 'a> {
     at: &'p Point<'p, 'm, 'a>,
     action: &'p Action<'a>,
     signs: Signs,
-    /// The gradient of h_j' by the state.
+    /// The gradient of h_j' by the state: the direction of the normal velocity.
     normal: Vec<f64>,
-    /// The direction of the normal velocity, with states measured by their sizes.
-    towards: Vec<f64>,
-    sizes: Vec<f64>,
-    /// A small velocity towards the surface, small also beside a moment of the others.
+    /// A small velocity.
+    slow: f64,
+    /// One that is small beside it, towards the surface.
     approach: f64,
 }
 
@@ -421,19 +416,15 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         let signs = mode.signs();
         let mut normal = vec![0.0; at.x.len()];
         at.system.rate_gradient(j, &at.place(&signs), &mut normal)?;
-        let units = at.units();
-        let sizes: Vec<f64> = (0..at.x.len()).map(|i| units.of_state(i)).collect();
-        let pairs = normal.iter().zip(&sizes);
-        let towards: Vec<f64> = pairs.map(|(n, size)| n * size * size).collect();
-        let length = dot(&towards, &normal).sqrt();
-        let approach = -f64::from(mode.entries()[j]) * MOMENT * MOMENT / length;
+        let slow = MOMENT * (1.0 + dot(at.x, at.x).sqrt());
+        let size = dot(&normal, &normal).sqrt();
+        let approach = -f64::from(mode.entries()[j]) * MOMENT * slow / size;
         Ok(Impact {
             at,
             action,
             signs,
             normal,
-            towards,
-            sizes,
+            slow,
             approach,
         })
     }
@@ -449,7 +440,7 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
 
     /// What an approach at these velocities adds to the change of the state, per normal velocity.
     fn impulse(&self, x: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let pairs = x.iter().zip(&self.towards);
+        let pairs = x.iter().zip(&self.normal);
         let hits: Vec<f64> = pairs.map(|(x, n)| x + self.approach * n).collect();
         let (stays, after) = (self.applied(x)?.0, self.applied(&hits)?.0);
         let change = |i: usize| ((after[i] - hits[i]) - (stays[i] - x[i])) / self.approach;
@@ -458,7 +449,7 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
 
     /// Is it an impact, and not an action that leaves the velocity towards the surface as it is?
     fn changes_normal_velocity(&self, impulse: &[f64]) -> bool {
-        dot(impulse, &self.normal).abs() > FRICTION_IN_MAP * dot(&self.towards, &self.normal)
+        dot(impulse, &self.normal).abs() > FRICTION_IN_MAP * dot(&self.normal, &self.normal)
     }
 
     /// Does its impulse depend on a tangential velocity, as that of friction does?
@@ -469,17 +460,15 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
     fn depends_on_tangential_velocity(&self, x: &[f64], usual: &[f64]) -> Result<bool, FieldError> {
         let mut other = x.to_vec();
         for i in (0..x.len()).filter(|&i| self.normal[i] == 0.0) {
-            let slow = MOMENT * self.sizes[i];
-            let mut values = SmallVec::<[f64; 3]>::from_slice(&[x[i] + slow, x[i] - slow]);
+            let mut values =
+                SmallVec::<[f64; 3]>::from_slice(&[x[i] + self.slow, x[i] - self.slow]);
             if usual[i] != 0.0 {
                 values.push(-x[i]);
             }
             for value in values {
                 other[i] = value;
                 let impulse = self.impulse(&other)?;
-                let in_units = |(i, v): (usize, &f64)| v / self.sizes[i];
-                let own = || impulse.iter().enumerate().map(in_units);
-                let pairs = || own().zip(usual.iter().enumerate().map(in_units));
+                let pairs = || impulse.iter().zip(usual);
                 let largest = pairs().fold(0.0_f64, |most, (a, b)| most.max(a.abs()).max(b.abs()));
                 if pairs().any(|(a, b)| (a - b).abs() > FRICTION_IN_MAP * largest) {
                     return Ok(true);

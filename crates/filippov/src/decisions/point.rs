@@ -149,12 +149,6 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         self.scale.size(i, self.x[i])
     }
 
-    /// The field of a mode in contact, with the bodies on these sides; `None` without any contact.
-    pub fn contact(&self, mode: &Mode, sides: &[i8]) -> Option<ContactField<'p>> {
-        let field = ContactField::new(self.system, self.actions, mode, sides, self.q)?;
-        Some(field.with_units(self.policy.law.units))
-    }
-
     /// What moves points onto surfaces.
     pub fn projector(&self) -> Projector {
         let units = self.policy.law.units.parts(self.x.len());
@@ -203,7 +197,8 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
 
     /// The field of a mode, with the contact of bodies, from a start of which this is known.
     pub fn field_of(&self, mode: &Mode, start: Option<&Start>) -> ModeField<'p> {
-        if let Some(field) = self.contact(mode, self.arrival.sides) {
+        let sides = self.arrival.sides;
+        if let Some(field) = ContactField::new(self.system, self.actions, mode, sides, self.q) {
             return ModeField::Contact(Box::new(field));
         }
         let mut field = ModeField::of(self.system, self.policy.law, mode, self.q);

@@ -14,7 +14,7 @@ use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::sparse::SparseRows;
 use crate::status::Stop;
-use crate::system::AffineParts;
+use crate::system::{dot, AffineParts};
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
 
 /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
@@ -191,21 +191,11 @@ fn relay_at(
     if !stay_together(problem.n, gradients, &solution.loops) {
         solution.uniqueness = Uniqueness::Unknown;
     }
-    let units = at.units();
-    let paces = parts.field.iter().enumerate();
-    let paces = paces.map(|(i, v)| v.abs() / units.of_state(i));
-    let pace = paces.fold(0.0, f64::max);
+    let speed = 1.0 + dot(&parts.field, &parts.field).sqrt();
     let sum = |rows: &SparseRows, i: usize| rows.row(i).map(|(_, v)| v.abs()).sum::<f64>();
-    let reach = |i: usize| {
-        let entries = gradients.row(i);
-        entries
-            .map(|(k, g)| g.abs() * units.of_state(k))
-            .sum::<f64>()
-            * pace
-    };
     let may_be_tangent = (0..before.len()).any(|i| {
         let size = problem.nu[i].abs() + sum(problem.n, i);
-        size <= AT_SIDE * (parts.time_rates[i].abs() + reach(i))
+        size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
     });
     Ok(Some(Posed {
         solution,

@@ -141,7 +141,7 @@ impl<'a> Piece<'a> {
         let zeros = mode.sliding_set();
         let sliding: Vec<usize> = zeros.filter(|j| !contacts.contains(j)).collect();
         let field = match contact {
-            Some(contact) => ModeField::Contact(Box::new(contact.with_units(law.units))),
+            Some(contact) => ModeField::Contact(Box::new(contact)),
             None => ModeField::of(&extended.system, law, mode, q),
         };
         let mut signs = mode.signs();

@@ -6,10 +6,9 @@ use super::guard::Guards;
 use super::{Guard, Motion, SmoothField};
 use crate::cube::{is_scaling_stable, Matrix};
 use crate::error::FieldError;
-use crate::error_scale::Units;
 use crate::mode::Mode;
 use crate::system::Actions;
-use crate::system::{dot, dot_magnitude, eval_on_side, OwnSetting, PiecewiseSystem, Setting};
+use crate::system::{dot, eval_on_side, OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{DOUBTFUL, ROUNDING, VANISHING_GERM};
 
 /// The field of contact,
@@ -30,8 +29,6 @@ pub struct ContactField<'a> {
     contacts: Vec<(usize, f64)>,
     sliding: Vec<usize>,
     setting: OwnSetting,
-    /// The sizes of the states.
-    units: Units<'a>,
     n_evaluations: u64,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
@@ -73,7 +70,6 @@ impl<'a> ContactField<'a> {
             contacts,
             sliding,
             setting: OwnSetting::new(Setting::new(&signs, discrete)),
-            units: Units::ONES,
             n_evaluations: 0,
             multipliers: Vec::new(),
             coupling: Matrix::zeros(0),
@@ -81,12 +77,6 @@ impl<'a> ContactField<'a> {
             ratios: Vec::new(),
             exits: Vec::new(),
         })
-    }
-
-    /// The same for states of these sizes.
-    #[must_use]
-    pub(crate) fn with_units(self, units: Units<'a>) -> Self {
-        ContactField { units, ..self }
     }
 
     /// Takes over the discrete states that an action left.
@@ -147,7 +137,7 @@ impl<'a> ContactField<'a> {
                 map.impulse(t, x, row, signs, q, &mut w)?;
             }
             let strength = dot(row, &w);
-            let size = dot_magnitude(row, &w);
+            let size = (dot(row, row) * dot(&w, &w)).sqrt();
             let scale = if strength.abs() > DOUBTFUL * size {
                 side / strength
             } else {
@@ -220,8 +210,7 @@ impl Motion for ContactField<'_> {
             .contacts()
             .chain(self.sliding.iter().copied())
             .collect();
-        let projector = super::Projector::new(x.len(), self.system.n_surfaces());
-        let mut projector = projector.measured_in(self.units.parts(x.len()));
+        let mut projector = super::Projector::new(x.len(), self.system.n_surfaces());
         projector.project_onto(self.system, &set, t, x, self.setting.get())?;
         let n = x.len();
         for _ in 0..2 {
@@ -257,10 +246,6 @@ impl SmoothField for ContactField<'_> {
         let (base, changes) = self.sides(t, x)?;
         let n = x.len();
         let (mut rows, mut rates) = (Vec::new(), Vec::new());
-        let units = self.units.at(x);
-        let sizes: Vec<f64> = (0..n).map(|i| units.of_state(i)).collect();
-        let paces = base.iter().zip(&sizes).map(|(v, size)| v.abs() / size);
-        let pace = paces.fold(0.0, f64::max);
         self.noise.clear();
         for &(j, _) in &self.contacts {
             let mut row = vec![0.0; n];
@@ -268,7 +253,7 @@ impl SmoothField for ContactField<'_> {
                 .system
                 .rate_gradient(j, &self.setting.at(t, x), &mut row)?;
             rates.push(-(rate.time + dot(&row, &base)));
-            let size = rate.time.abs() + dot_magnitude(&row, &sizes) * pace;
+            let size = rate.time.abs() + (dot(&row, &row) * dot(&base, &base)).sqrt();
             self.noise.push(VANISHING_GERM * size);
             rows.push(row);
         }

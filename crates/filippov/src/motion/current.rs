@@ -150,7 +150,6 @@ impl<'a> CurrentMotion<'a> {
         if !self.actions.list.is_empty() && !sliding.is_empty() {
             let (mode, sides, q) = (&self.mode, &self.sides, &self.discrete);
             if let Some(contact) = ContactField::new(system, self.actions, mode, sides, q) {
-                let contact = contact.with_units(self.law.units);
                 return self.replace_field(ModeField::Contact(Box::new(contact)));
             }
         }

@@ -145,8 +145,7 @@ pub fn replay_decision(
     let contact = if actions.list.is_empty() || sliding.is_empty() {
         None
     } else {
-        let contact = ContactField::new(system, actions, mode, &point.sides, &point.q);
-        contact.map(|contact| contact.with_units(law.units))
+        ContactField::new(system, actions, mode, &point.sides, &point.q)
     };
     let mut field = match contact {
         Some(contact) => ModeField::Contact(Box::new(contact)),

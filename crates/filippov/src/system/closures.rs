@@ -1,8 +1,8 @@
 //! A system given by Rust closures.
 
 use super::{
-    central, dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Place, RatePartials,
-    SignStructure, Word,
+    dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Place, RatePartials, SignStructure,
+    Word,
 };
 use crate::error::FieldError;
 use crate::tolerances::EPS;
@@ -130,13 +130,17 @@ pub(super) fn rate_gradient_by_differences<S: PiecewiseSystem + ?Sized>(
     } = at(t, x)?;
     let mut moved = x.to_vec();
     for (i, out) in gradient.iter_mut().enumerate() {
-        *out = central(x[i], |value| {
-            moved[i] = value;
-            Ok(at(t, &moved)?.value)
-        })?;
+        let d = EPS.cbrt() * (1.0 + x[i].abs());
+        let (up, down) = (x[i] + d, x[i] - d);
+        moved[i] = up;
+        let above = at(t, &moved)?.value;
+        moved[i] = down;
+        let below = at(t, &moved)?.value;
         moved[i] = x[i];
+        *out = (above - below) / (up - down);
     }
-    let time = central(t, |t| Ok(at(t, x)?.value))?;
+    let d = EPS.cbrt() * (1.0 + t.abs());
+    let time = (at(t + d, x)?.value - at(t - d, x)?.value) / (2.0 * d);
     Ok(RatePartials {
         rate,
         magnitude,

@@ -21,6 +21,7 @@ pub(super) fn central(
     let small = EPS.powf(1.0 / 6.0);
     let mut reach = EPS.cbrt() * (1.0 + at.abs());
     let mut longer = slope(reach)?;
+    let rounding = 10.0 * EPS / (reach * small);
     let (mut best, mut least) = (longer, f64::INFINITY);
     if at.abs() > small {
         return Ok(best);
@@ -32,8 +33,8 @@ pub(super) fn central(
         if apart < least {
             (best, least) = (longer, apart);
         }
-        // Beyond that rounding grows as the reach becomes shorter.
-        if apart <= EPS.cbrt() * longer.abs() || apart > least {
+        // What is left is rounding, which grows as the reach becomes shorter.
+        if apart <= rounding * longer.abs() || apart > least {
             break;
         }
         longer = shorter;
