@@ -1,56 +1,29 @@
 //! Groups of points that lie near one another.
 
-use std::collections::BTreeMap;
-
 /// The group of each point, counted from 0 in the order of the first points: two points are in one group if a chain of points leads
 /// from one to the other in which neighbours differ by at most `reach` in every component.
 ///
 /// So the points of a cycle, which lie all along it, are one group.
 pub fn clusters(points: &[Vec<f64>], reach: &[f64]) -> Vec<usize> {
-    // Points in one box of the size of the reach, and in boxes beside it, are compared.
-    let box_of = |point: &[f64]| -> Vec<i64> {
-        let components = point.iter().zip(reach);
-        components
-            .map(|(value, reach)| (value / reach).floor() as i64)
-            .collect()
-    };
-    let mut boxes: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
-    for (index, point) in points.iter().enumerate() {
-        boxes.entry(box_of(point)).or_default().push(index);
-    }
     let mut parents: Vec<usize> = (0..points.len()).collect();
     let is_near = |a: &[f64], b: &[f64]| {
         let mut components = a.iter().zip(b).zip(reach);
         components.all(|((a, b), reach)| (a - b).abs() <= *reach)
     };
-    for (place, own) in &boxes {
-        for (other, members) in boxes.range(place.clone()..) {
-            let first = other.first().zip(place.first());
-            if first.is_some_and(|(other, place)| other - place > 1) {
-                break;
-            }
-            let mut steps = other.iter().zip(place);
-            if !steps.all(|(other, place)| (other - place).abs() <= 1) {
-                continue;
-            }
-            for &a in own {
-                for &b in members {
-                    let (root_a, root_b) = (root(&mut parents, a), root(&mut parents, b));
-                    if root_a != root_b && is_near(&points[a], &points[b]) {
-                        parents[root_a.max(root_b)] = root_a.min(root_b);
-                    }
-                }
-            }
+    for (b, point) in points.iter().enumerate() {
+        for a in (0..b).filter(|&a| is_near(&points[a], point)) {
+            let (root_a, root_b) = (root(&mut parents, a), root(&mut parents, b));
+            parents[root_a.max(root_b)] = root_a.min(root_b);
         }
     }
-    let mut names = BTreeMap::new();
-    let roots = (0..points.len()).map(|index| root(&mut parents, index));
-    let roots: Vec<usize> = roots.collect();
-    for &root in &roots {
-        let next = names.len();
-        names.entry(root).or_insert(next);
-    }
-    roots.iter().map(|root| names[root]).collect()
+    let (mut names, mut next) = (vec![None; points.len()], 0);
+    let name = |index: usize| {
+        *names[root(&mut parents, index)].get_or_insert_with(|| {
+            next += 1;
+            next - 1
+        })
+    };
+    (0..points.len()).map(name).collect()
 }
 
 fn root(parents: &mut [usize], mut index: usize) -> usize {

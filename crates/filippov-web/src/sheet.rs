@@ -1,7 +1,5 @@
 //! The surfaces in a window, as polylines, and what the fields do at them.
 
-use std::collections::BTreeMap;
-
 use filippov::{BothSides, FieldError, PiecewiseSystem, Setting};
 use filippov_expr::sort_few;
 
@@ -159,6 +157,8 @@ impl Plane<'_> {
         let cells = self.window.cells;
         let side = cells + 1;
         let mut lines = Lines::default();
+        // The point on each edge that was looked at, if there is one: two edges begin at each corner.
+        let mut places = vec![None; 2 * side * side];
         for row in 0..cells {
             for column in 0..cells {
                 // The corners, around the cell.
@@ -175,14 +175,15 @@ impl Plane<'_> {
                     if (at(a) < 0.0) == (at(b) < 0.0) || !(at(a) - at(b)).is_finite() {
                         continue;
                     }
-                    let name = (a.min(b), a.max(b));
-                    let place = match lines.places.get(&name) {
-                        Some(&place) => place,
+                    let (first, last) = (a.min(b), a.max(b));
+                    let edge = 2 * (first.1 * side + first.0) + usize::from(first.0 == last.0);
+                    let place = match places[edge] {
+                        Some(place) => place,
                         None => {
-                            let ends = [name.0, name.1].map(|end| (self.corner(end), at(end)));
+                            let ends = [first, last].map(|end| (self.corner(end), at(end)));
                             let place = self.zero_between(j, ends)?;
                             let place = place.map(|point| lines.add(point));
-                            lines.places.insert(name, place);
+                            places[edge] = Some(place);
                             place
                         }
                     };
@@ -328,8 +329,6 @@ fn with_tangencies(points: &[SheetPoint]) -> Vec<SheetPoint> {
 /// Points with at most two neighbours each.
 #[derive(Default)]
 struct Lines {
-    /// The point on each edge of the grid that was looked at, if there is one.
-    places: BTreeMap<(Corner, Corner), Option<usize>>,
     points: Vec<[f64; 2]>,
     neighbours: Vec<Vec<usize>>,
 }

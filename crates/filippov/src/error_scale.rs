@@ -116,6 +116,7 @@ impl<'a> Units<'a> {
     };
 
     /// Those at a point: a state that is zero has the size of the smallest one there that is not, in comparison.
+    #[inline(never)]
     #[must_use]
     pub fn at<'s>(self, x: &'s [f64]) -> Units<'s>
     where
@@ -138,6 +139,7 @@ impl<'a> Units<'a> {
     }
 
     /// The size of state `i`.
+    #[inline(never)]
     pub fn of_state(&self, i: usize) -> f64 {
         self.x.get(i).map_or(0.0, |x| x.abs()) + self.least * self.part(i)
     }
@@ -152,6 +154,7 @@ impl<'a> Units<'a> {
     }
 
     /// The sizes of `n` states as parts of the largest; none if they are the same.
+    #[inline(never)]
     pub fn parts(&self, n: usize) -> Vec<f64> {
         let parts = (0..n).map(|i| self.part(i));
         match parts.clone().all(|part| part == 1.0) {
@@ -160,6 +163,7 @@ impl<'a> Units<'a> {
         }
     }
 
+    #[inline(never)]
     fn part(&self, i: usize) -> f64 {
         match self.atol.get(i) {
             Some(atol) if *atol > 0.0 && self.atol.len() > 1 => atol / self.most,

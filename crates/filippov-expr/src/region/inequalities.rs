@@ -4,6 +4,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::few::sort_few;
 use crate::linear::LinearForm;
 use crate::node::NodeId;
 
@@ -95,7 +96,7 @@ impl Inequality {
             .filter(|(_, (value, size))| value.abs() > ROUNDING * size)
             .map(|(id, (value, _))| (id, value))
             .collect();
-        terms.sort_unstable_by_key(|term| term.0);
+        sort_few(&mut terms, |a, b| a.0 < b.0);
         Inequality {
             terms,
             constant: self.constant / a + other.constant / b,

@@ -281,7 +281,7 @@ fn drop_other_names(
     }
     let around = meeting.surroundings(at, notes)?;
     let units = at.units();
-    let pace = around.map_or(0.0, |around| around.corners.pace(|i| units.of_state(i)));
+    let pace = around.map_or(0.0, |around| around.corners.pace(&|i| units.of_state(i)));
     let stays_on = |one: &Viable, j: usize| {
         let mut left = one.next.left.iter();
         one.next.mode.entries()[j] == 0

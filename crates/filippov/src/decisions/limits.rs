@@ -459,6 +459,7 @@ impl Reach {
     }
 
     /// How far a function with this value and gradient is from zero: 1 at the border.
+    #[inline(never)]
     fn to(&self, value: f64, gradient: &[f64]) -> f64 {
         let along = |parts: &[f64]| dot_magnitude(gradient, parts);
         let (size, tolerance) = (along(&self.sizes), along(&self.tolerances));

@@ -150,12 +150,14 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
     }
 
     /// What moves points onto surfaces.
+    #[inline(never)]
     pub fn projector(&self) -> Projector {
         let units = self.policy.law.units.parts(self.x.len());
         Projector::new(self.x.len(), self.system.n_surfaces()).measured_in(units)
     }
 
     /// The sizes of the states, and the time in which one changes by its size along the motion that ends here.
+    #[inline(never)]
     pub fn units(&self) -> Units<'_> {
         let units = self.policy.law.units.at(self.x);
         let velocity = self.arrival.velocity.iter().enumerate();

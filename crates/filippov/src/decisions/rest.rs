@@ -36,7 +36,7 @@ pub(super) fn stay_if_nothing_leaves(
         let velocity = at.velocity(notes, &stays.mode, &[])?;
         let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
         let units = at.units();
-        let pace = corners.pace(|i| units.of_state(i));
+        let pace = corners.pace(&|i| units.of_state(i));
         if velocity.iter().all(|v| v.is_finite()) {
             let mut parts = velocity.iter().enumerate();
             let is_rest = parts.all(|(i, v)| v.abs() <= AT_SIDE * pace * units.of_state(i));

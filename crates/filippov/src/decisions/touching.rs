@@ -154,7 +154,7 @@ pub(super) fn keeps_together(
         let size: f64 = entries
             .map(|(i, entry)| entry.abs() * units.of_state(i))
             .sum();
-        let pace = corners.pace(|i| units.of_state(i));
+        let pace = corners.pace(&|i| units.of_state(i));
         rate.abs() <= DOUBTFUL * (normal[n].abs() + pace * size)
     }))
 }

@@ -55,7 +55,7 @@ pub(super) fn survey(
         Err(Undecided::NotFinite) => return by_trial(at, notes, meeting).map(Some),
         Err(_) => return Ok(None),
     };
-    let pace = corners.pace(|i| at.size(i));
+    let pace = corners.pace(&|i| at.size(i));
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);

@@ -17,7 +17,9 @@ use crate::error_scale::Units;
 use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::motion::{Guard, Leading, ModeField, Projector, RootEnd, Seen, SlidingSet, SmoothField};
+use crate::motion::{
+    Guard, Leading, ModeField, Projector, RootEnd, Run, Seen, SlidingSet, SmoothField,
+};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, Warning, WarningCode};
@@ -229,7 +231,7 @@ impl<'a> Integrator<'a> {
         {
             return self.begin(next, &event.multiple);
         }
-        let due = self.triggered_by_a_sign(&before, &next.mode, &concerned);
+        let due = triggered_by_a_sign(&self.run, &before, &next.mode, &concerned);
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !due.is_empty() {
             let (system, t) = (self.run.system, self.run.t);
@@ -255,24 +257,6 @@ impl<'a> Integrator<'a> {
             }
         }
         self.begin(next, &event.multiple)
-    }
-
-    /// The actions at surfaces whose functions jump through zero with the sign of another one: that of a floor, or of a branch.
-    fn triggered_by_a_sign(&self, before: &Mode, after: &Mode, reached: &[usize]) -> Vec<usize> {
-        let actions = self.run.actions;
-        if actions.list.is_empty() || !self.run.system.has_nested_signs() {
-            return Vec::new();
-        }
-        let triggers = self.run.motion.triggers(self.run.system);
-        let sides = before.entries().iter().zip(after.entries()).enumerate();
-        let jumps = sides.filter(|(j, (side, now))| {
-            **side * **now == -1 && !reached.contains(j) && !triggers.is_internal(*j)
-        });
-        let due = jumps.flat_map(|(j, (side, _))| actions.triggered_at(j, *side));
-        let mut due: Vec<usize> = due.collect();
-        due.sort_unstable();
-        due.dedup();
-        due
     }
 
     /// After too many switches without any progress of time: goes on from their limit, or ends the run.
@@ -1060,6 +1044,23 @@ fn follow_clinging(
     }
     integrator.control.forget_proposal();
     integrator.go_on_from_here(&[])
+}
+
+/// The actions at surfaces whose functions jump through zero with the sign of another one: that of a floor, or of a branch.
+fn triggered_by_a_sign(run: &Run, before: &Mode, after: &Mode, reached: &[usize]) -> Vec<usize> {
+    if run.actions.list.is_empty() || !run.system.has_nested_signs() {
+        return Vec::new();
+    }
+    let triggers = run.motion.triggers(run.system);
+    let sides = before.entries().iter().zip(after.entries()).enumerate();
+    let jumps = sides.filter(|(j, (side, now))| {
+        **side * **now == -1 && !reached.contains(j) && !triggers.is_internal(*j)
+    });
+    let due = jumps.flat_map(|(j, (side, _))| run.actions.triggered_at(j, *side));
+    let mut due: Vec<usize> = due.collect();
+    due.sort_unstable();
+    due.dedup();
+    due
 }
 
 /// Forgets the choices since time last went on: the motion has come back at once, whatever was chosen.

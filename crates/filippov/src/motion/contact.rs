@@ -1,5 +1,6 @@
 //! The field of a body in contact: h = 0 and h' = 0 at unilateral constraints, with sliding on other surfaces.
 
+use filippov_expr::sort_few;
 use smallvec::SmallVec;
 
 use super::guard::Guards;
@@ -199,7 +200,7 @@ impl Motion for ContactField<'_> {
         let mu = self.multipliers[self.contacts.len()..].iter();
         let lambdas = mu.zip(&self.ratios).map(|(mu, r)| (2.0 * mu - 1.0) / r);
         all.extend(self.sliding.iter().copied().zip(lambdas));
-        all.sort_by_key(|(j, _)| *j);
+        sort_few(&mut all, |a, b| a.0 < b.0);
         all.into_iter().map(|(_, lambda)| lambda).collect()
     }
 

@@ -179,7 +179,7 @@ impl MeetingFields {
         if m > MOST_MEETING {
             return Ok(ties);
         }
-        let units = units.with_pace(self.pace(|k| self.sizes[k]));
+        let units = units.with_pace(self.pace(&|k| self.sizes[k]));
         for (leader, follower) in (0..m).flat_map(|i| (i + 1..m).map(move |k| (i, k))) {
             let is_tied = |tie: &Tie| tie.follower == follower || tie.follower == leader;
             if ties.iter().any(is_tied) || !self.has_parallel([leader, follower], place, units) {
@@ -325,7 +325,7 @@ impl MeetingFields {
     /// all fields at one speed, which is zero: up to rounding of the terms that it is made of, and in the sizes of the states.
     pub fn telling(&self) -> Vec<usize> {
         let (m, n) = (self.set.len(), self.n);
-        let pace = self.pace(|k| self.sizes[k]);
+        let pace = self.pace(&|k| self.sizes[k]);
         let is_telling = |&i: &usize| {
             let gradient = &self.gradients[i * n..(i + 1) * n];
             let reach = dot_magnitude(gradient, &self.sizes) * pace;
@@ -350,7 +350,7 @@ impl MeetingFields {
     }
 
     /// The largest rate at which the fields change components of the state, in units of these sizes.
-    pub fn pace(&self, size: impl Fn(usize) -> f64) -> f64 {
+    pub fn pace(&self, size: &dyn Fn(usize) -> f64) -> f64 {
         let mut row = 0;
         let groups = self.groups.iter().map(|group| {
             let rows = row * self.n..(row + (1 << group.len())) * self.n;

@@ -183,6 +183,7 @@ impl Projector {
     }
 
     /// Takes away from `x` the shortest move that changes the functions by these values; `false` if none is known.
+    #[inline(never)]
     fn shift(&mut self, values: &Vector, x: &mut [f64]) -> bool {
         let rows = self.rows.chunks_exact_mut(x.len());
         rows.for_each(|row| scale(row, &self.units));
@@ -219,6 +220,7 @@ impl Projector {
 }
 
 /// Multiplies a row by the units, if states have different ones.
+#[inline(never)]
 fn scale(row: &mut [f64], units: &[f64]) {
     row.iter_mut()
         .zip(units)

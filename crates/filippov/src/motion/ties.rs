@@ -174,15 +174,21 @@ pub fn normal(
 
 /// Are two normals the same, up to their lengths, or is one zero? In the user's units, and in those of the states.
 pub fn parallel(one: &[f64], other: &[f64], place: &Place<'_>, units: Units<'_>) -> bool {
-    let in_units = |row: &[f64]| -> Vec<f64> {
-        let sizes = (0..place.x.len()).map(|i| units.of_state(i));
-        let sizes = sizes.chain([units.of_time(place.t)]);
-        row.iter().zip(sizes).map(|(v, size)| v * size).collect()
-    };
-    let are_same = |one: &[f64], other: &[f64]| {
-        are_parallel(dot(one, other), dot(one, one) * dot(other, other))
-    };
-    are_same(one, other) && are_same(&in_units(one), &in_units(other))
+    let mut products = [[0.0; 3]; 2];
+    for (i, (a, b)) in one.iter().zip(other).enumerate() {
+        let unit = match i < place.x.len() {
+            true => units.of_state(i),
+            false => units.of_time(place.t),
+        };
+        for (sums, unit) in products.iter_mut().zip([1.0, unit]) {
+            let (a, b) = (a * unit, b * unit);
+            sums[0] += a * b;
+            sums[1] += a * a;
+            sums[2] += b * b;
+        }
+    }
+    let mut both = products.iter();
+    both.all(|[product, a, b]| are_parallel(*product, a * b))
 }
 
 /// The same, from the product of the normals and that of their squares.
