@@ -228,3 +228,40 @@ def test_events_that_can_be_read_once_are_all_found() -> None:
         found = system.solve((0, 10), [1.0, 0.0], events=once, **options).t_events
         assert len(expected[0]) > 1
         np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
+
+
+def test_events_on_surfaces_and_resets_are_their_switches() -> None:
+    """Rounding decided whether the function changed its sign there."""
+
+    def forced(t: float, x: Any) -> Any:
+        return [x[1], -x[0] - 0.5 * np.sign(x[1]) + 1.5 * np.sin(1.3 * t)]
+
+    for method in ("auto", "DOPRI5", "DOP853", "Rodas5P"):
+        sol = fl.solve_ivp(forced, (0, 7.47), [1.0, 0.0], method=method, events=lambda t, x: 2 * x[1])
+        arrives = [switch.t for switch in sol.switches if switch.kind != "exit_sliding"]
+        assert sol.t_events[0].tolist() == [0.0, *arrives]
+
+    bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.5 * x[1]], direction="down")
+    eighth = fl.Event(lambda t, x: x[0], terminal=8)
+    fall = math.sqrt(2 / 9.81)
+    for method in ("auto", "DOPRI5", "Rodas5P"):
+        sol = fl.solve_ivp(
+            lambda t, x: [x[1], -9.81], (0, 3), [1.0, 0.0], resets=bounce, method=method, events=eighth
+        )
+        assert sol.t[-1] == pytest.approx(fall + 2 * fall * sum(0.5**k for k in range(1, 8)), abs=1e-8)
+
+
+def test_a_zero_before_a_jump_is_not_divided_out_behind_it() -> None:
+    back = fl.Reset(times=[1.0], map=lambda t, x: [x[0] - 1.0])
+    sol = fl.solve_ivp(lambda t, x: [1.0], (0, 3), [0.0], events=lambda t, x: x[0] - 1, resets=back)
+    np.testing.assert_allclose(sol.t_events[0], [1.0, 2.0], rtol=0, atol=1e-12)
+
+
+def test_an_event_on_a_count_that_reaches_the_value() -> None:
+    tick = fl.Reset(period=1.0, phase=0.5, set={"n": lambda t, x, n: n + 1})
+    system = fl.System(lambda t, x: [0.0], n=1, discrete={"n": 0}, resets=tick)
+    down = fl.Event(lambda t, x, n: n - 3.0, "down")
+    stop = fl.Event(lambda t, x, n: n - 3.0, terminal=True)
+    sol = system.solve((0, 9), [0.0], events=[down, stop])
+    assert sol.t_events[0].tolist() == []
+    assert sol.t[-1] == 2.5

@@ -290,3 +290,40 @@ def test_a_run_that_fails_hands_over_its_part() -> None:
     with pytest.raises(fl.ModelError) as raised:
         fl.gradient(blows, (0, 5), [1.0], terminal=lambda t, y: y[0], wrt="y0")
     assert 0.5 < raised.value.partial.t[-1] < 1.0
+
+
+def test_a_running_cost_is_followed_by_value() -> None:
+    system = fl.System(lambda t, x, F=0.5: [x[1], -x[0] - F * np.sign(x[1])], n=2)
+    target = [0.0]
+
+    def cost(t: float, y: Any) -> Any:
+        return (y[0] - target[0]) ** 2
+
+    first = fl.gradient(system, (0, 3), [1.0, 0.3], running=cost)
+    target[0] = 5.0
+    second = fl.gradient(system, (0, 3), [1.0, 0.3], running=cost)
+    fresh = fl.gradient(system, (0, 3), [1.0, 0.3], running=lambda t, y: (y[0] - 5.0) ** 2)
+    assert second[0] == pytest.approx(fresh[0], rel=1e-12)
+    assert second[0] > first[0] + 10.0
+
+
+def test_costs_have_parameters_that_are_given_by_name() -> None:
+    system = fl.System(lambda t, x, F=0.5: [x[1], -x[0] - F * np.sign(x[1])], n=2)
+    arguments: Any = (system, (0, 3), [1.0, 0.3])
+    by_dict = fl.gradient(*arguments, {"F": 0.3}, terminal=lambda t, y, F: F * y[0] + F**2)
+    by_name = fl.gradient(*arguments, F=0.3, terminal=lambda t, y, F: F * y[0] + F**2)
+    assert by_dict == by_name
+
+
+def test_an_instant_at_a_switch_is_warned_of() -> None:
+    relay = fl.System(lambda t, x, a=0.5: [a - np.sign(x[0])], n=1)
+    with pytest.warns(fl.FilippovWarning, match="of one side"):
+        fl.gradient(relay, (0, 5), [1.0], instants=[(2.0, lambda t, y: y[0])])
+
+
+def test_second_derivatives_between_steps_where_some_are_not_known() -> None:
+    system = fl.System(lambda t, x, F=1.0: [x[1], -x[0] - F * np.sign(x[1] - 0.2)], n=2)
+    with pytest.warns(fl.FilippovWarning, match="second derivatives"):
+        sol = system.solve((0, 10), [0.0, 0.2], wrt=["y0", "F"], order=2)
+    for t in (7.0, 8.5, 9.99, 10.0):
+        assert sol.derivative(t, order=2)[0, 2, 2] == pytest.approx(-5 * np.sin(t - 5), abs=1e-5)

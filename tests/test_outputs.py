@@ -251,3 +251,29 @@ def test_defaults_of_the_function_are_parameters() -> None:
     one = system.solve((0, 3), [1.0, 0.0], F=0.1)
     assert np.allclose(one.y[:, -1], changed.solve((0, 3), [1.0, 0.0]).y[:, -1], rtol=0, atol=1e-12)
     assert fl.System(lambda t, x, a, b=3.0: [a * b * x[0]], n=1, args=(2.0,)).params == {"b": 3.0}
+
+
+def test_outputs_at_ticks_and_levels_have_the_limit_that_is_meant() -> None:
+    """The field contains none of these functions."""
+    outputs = {
+        "level": lambda t, x: np.floor(t),
+        "ramp": lambda t, x: fl.sawtooth(t, 1.0),
+        "gate": lambda t, x: fl.square(t, 1.0),
+        "on": lambda t, x: x[0] >= 1,
+        "falls": lambda t, x: np.floor(-x[0]),
+    }
+    system = fl.System(lambda t, x: [1.0], n=1, outputs=outputs)
+    times = [0.0, 0.5, 1.0, 1.5, 2.0]
+    sol = system.solve((0, 2), [0.0], t_eval=times)
+    assert sol.outputs["level"].tolist() == [0, 0, 1, 1, 2]
+    assert sol.outputs["ramp"].tolist() == [0, 0.5, 0, 0.5, 0]
+    assert sol.outputs["gate"].tolist() == [1, -1, 1, -1, 1]
+    assert sol.outputs["on"].tolist() == [0, 0, 1, 1, 1]
+    assert sol.outputs["falls"].tolist() == [-1, -1, -2, -2, -3]
+    assert sol.evaluate(outputs["level"], [1.0, 2.0], side="left").tolist() == [0, 1]
+    at_end = system.solve((0, 2), [0.0], keep="last").outputs
+    assert {name: values.tolist() for name, values in at_end.items()} == {
+        name: [values[-1]] for name, values in sol.outputs.items()
+    }
+    with pytest.raises(fl.ModelError, match="kept as a function"):
+        system.solve((0, 2), [0.0], dense_output=False).outputs["level"]

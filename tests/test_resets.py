@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import warnings
 
 import filippov as fl
 import numpy as np
@@ -438,3 +439,47 @@ def test_a_law_with_a_memory_is_refused_in_a_map(law):
         fun = (lambda t, x: [1.0, 0.0]) if surfaces is None else (lambda t, x: [math.exp(0.0 * x[0]), 0.0])
         with pytest.raises(fl.ModelError, match=r"entry 0 \(sample\): a law with a memory"):
             fl.solve_ivp(fun, (0, 2), [0.0, 0.0], resets=reset, surfaces=surfaces)
+
+
+@pytest.mark.parametrize(
+    "h",
+    [
+        lambda t, x: np.sign(x[0] - 2),
+        lambda t, x: np.floor(x[0]) - 1.5,
+        lambda t, x: np.where(x[0] > 2, x[0] - 1, x[0] - 3),
+        lambda t, x: np.digitize(x[0], [1.0, 2.0]) - 1.5,
+    ],
+)
+@pytest.mark.parametrize(("direction", "happens"), [("both", True), ("up", True), ("down", False)])
+def test_a_reset_whose_function_jumps_through_zero(h, direction, happens):
+    reset = fl.Reset(h, lambda t, x: [x[0] - 10], direction=direction)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        sol = fl.solve_ivp(lambda t, x: [1.0], (0, 2.9), [0.0], resets=reset)
+    assert sol.y[0, -1] == pytest.approx(-7.1 if happens else 2.9, abs=1e-12)
+
+
+def test_a_reset_on_a_count_that_reaches_the_value():
+    tick = fl.Reset(period=1.0, phase=0.5, set={"n": lambda t, x, n: n + 1})
+    again = fl.Reset(lambda t, x, n: n - 3, set={"n": 0})
+    system = fl.System(lambda t, x: [0.0], n=1, discrete={"n": 0}, resets=[tick, again])
+    sol = system.solve((0, 9), [0.0])
+    assert sol.evaluate(lambda t, x, n: n, np.arange(9) + 0.75).tolist() == [1, 2, 0] * 3
+    once = fl.Reset(lambda t, x, n: n - 3, lambda t, x: [x[0] + 1])
+    system = fl.System(lambda t, x: [0.0], n=1, discrete={"n": 0}, resets=[tick, once])
+    assert system.solve((0, 9), [0.0]).y[0, -1] == 1.0
+
+
+def test_ticks_within_rounding_of_the_start_are_done_in_order():
+    first = fl.Reset(period=0.1, phase=-0.7, set={"u": lambda t, x, u: u + 1})
+    second = fl.Reset(period=0.1, phase=0.2, set={"w": lambda t, x, u: u})
+    for resets, expected in (([first, second], 1.0), ([second, first], 0.0)):
+        system = fl.System(lambda t, x, u, w: [w], n=1, discrete={"u": 0.0, "w": 0.0}, resets=resets)
+        assert system.solve((0, 0.05), [0.0]).state("w")[-1] == expected
+
+
+def test_arguments_of_a_reset_without_effect_are_refused():
+    with pytest.raises(fl.InputError, match="phase belongs"):
+        fl.Reset(times=[1.0], phase=0.5, map=lambda t, x: x)
+    with pytest.raises(fl.InputError, match="direction belongs"):
+        fl.Reset(period=1.0, direction="up", map=lambda t, x: x)

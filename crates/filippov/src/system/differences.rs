@@ -41,3 +41,29 @@ pub(super) fn central(
     }
     Ok(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::central;
+
+    /// The slope of (x / u)^3 - x / u in units u of any size.
+    #[test]
+    fn the_unit_of_a_number_may_be_anything() {
+        for unit in [1e-9, 1e-6, 1e-3, 1.0, 1e6] {
+            for share in [0.0, 0.1, -0.7, 2.0] {
+                let cubic = |x: f64| Ok((x / unit).powi(3) - x / unit);
+                let slope = central(share * unit, cubic).map(|slope| slope * unit);
+                let exact = 3.0 * share * share - 1.0;
+                assert!(
+                    slope.is_ok_and(|slope| (slope - exact).abs() < 1e-5),
+                    "{unit}, {share}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_constant_has_no_slope() {
+        assert!(central(0.0, |_| Ok(0.3)).is_ok_and(|slope| slope == 0.0));
+    }
+}
