@@ -35,7 +35,7 @@ impl Parallels {
     /// Looks at all pairs.
     pub fn of(at: &Point, meeting: &[usize], mode: &Mode) -> Result<Self, FieldError> {
         let (signs, n) = (mode.signs(), at.x.len() + 1);
-        let (place, units) = (at.place(&signs), at.units());
+        let place = at.place(&signs);
         let mut normals = vec![0.0; n * meeting.len()];
         for (&j, row) in meeting.iter().zip(normals.chunks_exact_mut(n)) {
             row[n - 1] = at.system.gradient(j, &place, &mut row[..n - 1])?;
@@ -64,6 +64,7 @@ impl Parallels {
             if !has_normal(i) || !are_parallel(dot(one, other), squares[i] * squares[k]) {
                 continue;
             }
+            let units = at.units();
             if !parallel(one, other, &place, units) {
                 continue;
             }
