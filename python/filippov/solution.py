@@ -233,8 +233,8 @@ class Solution:
     -----
     A field is made when it is first read.
 
-    A copy by `pickle` has everything but `sol`, which is ``None`` there, and its derivatives: ask for the times
-    with `t_eval`, and for derivatives before.
+    A copy by `pickle` has everything but `sol`, which is ``None`` there, and its derivatives: ask for the
+    times with `t_eval`, and for derivatives before.
     """
 
     __slots__ = ("__dict__", "_origin", "_run")
