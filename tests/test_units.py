@@ -71,7 +71,7 @@ def test_a_curved_surface_is_kept_in_any_units() -> None:
 
 @pytest.mark.parametrize("power", [0, -30, 30])
 def test_touching_surfaces_in_large_and_small_units(power: int) -> None:
-    """The surfaces y + 0.4 x^3 = 0 and y = 0 touch at the origin, and the motion goes on along the second."""
+    """The surfaces y + 0.4 x^3 = 0 and y = 0 touch at the origin. Behind it the motion slides on y = 0."""
     size = 2.0**power
 
     def fun(t: float, z: Any) -> Any:
