@@ -8,8 +8,8 @@ use crate::mode::Mode;
 use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ModeField, SmoothField};
 use crate::status::Stop;
-use crate::system::dot;
-use crate::tolerances::{AT_SIDE, MOST_MEETING, VANISHING_GERM};
+use crate::system::{dot, eval_on_side, surfaces_that_matter};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, ROUNDING, VANISHING_GERM};
 
 /// An event while bodies are in contact, that triggers no action: a body leaves, or a surface of another kind
 /// is reached or left. `surfaces` vanish at the event.
@@ -19,9 +19,12 @@ pub(super) fn decide_in_contact(
     surfaces: &[usize],
 ) -> Result<Decided, FieldError> {
     let before = at.arrival.mode;
-    let (contacts, mut meeting): (Vec<usize>, Vec<usize>) = before
+    // What rested beside the motion takes part again: it was held by what ends.
+    let held = before
         .sliding_set()
-        .partition(|&j| at.triggers().is_only_trigger(j));
+        .chain(at.arrival.resting.iter().copied());
+    let (contacts, mut meeting): (Vec<usize>, Vec<usize>) =
+        held.partition(|&j| at.triggers().is_only_trigger(j));
     let mut mode = before.clone();
     for &j in surfaces {
         if at.triggers().is_only_trigger(j) {
@@ -31,12 +34,50 @@ pub(super) fn decide_in_contact(
         }
     }
     meeting.sort_unstable();
+    meeting.dedup();
     place_in_contact(at, notes, mode, &contacts, &meeting)
+}
+
+/// Adds the surfaces on which bodies are that come to rest at contacts: what is left of their speeds, below the tolerance, is taken
+/// away there.
+pub(super) fn add_reached_at_rest(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    contacts: &[usize],
+    mut meeting: Vec<usize>,
+) -> Result<Vec<usize>, FieldError> {
+    let closed = contacts
+        .iter()
+        .fold(mode.clone(), |mode, &j| mode.with(j, 0));
+    let mut field = at.field_of(&closed, None);
+    let mut x = at.x.to_vec();
+    field.project(at.t, &mut x)?;
+    if x == at.x {
+        return Ok(meeting);
+    }
+    let signs = mode.signs();
+    let mut h = vec![0.0; signs.len()];
+    at.system.surfaces(&at.place_at(at.t, &x, &signs), &mut h)?;
+    notes.n_surface_evaluations += 1;
+    for (j, h) in h.iter().enumerate() {
+        let is_other = at.system.switches_at(j)
+            && !at.triggers().is_only_trigger(j)
+            && !at.triggers().is_internal(j)
+            && !meeting.contains(&j);
+        let size = at.system.surface_size(j, &at.place_at(at.t, &x, &signs))?;
+        if is_other && h.abs() <= ROUNDING * size {
+            meeting.push(j);
+        }
+    }
+    meeting.sort_unstable();
+    Ok(surfaces_that_matter(at.system, mode, meeting))
 }
 
 /// The mode where bodies touch without velocity (`contacts`) and other surfaces vanish (`meeting`): that with the
 /// most bodies in contact and surfaces slid on, all of whose guards begin positive, if no other one is asked for. If there is
-/// none, one in which a guard stays zero; bodies without a force between them are free.
+/// none, one in which a guard stays zero; bodies without a force between them are free, and what a contact holds on a surface
+/// has the side to which it goes when that opens.
 pub(super) fn place_in_contact(
     at: &Point,
     notes: &mut Notes,
@@ -91,12 +132,58 @@ pub(super) fn place_in_contact(
         return Ok(found.ok_or(Stop::Contact { surfaces: all }));
     }
     let n_closed = |mode: &Mode| contacts.iter().filter(|&&j| mode.entries()[j] == 0).count();
-    let Some(mode) = neutral.into_iter().min_by_key(n_closed) else {
+    let mut best: Option<((usize, usize), Mode)> = None;
+    for mode in neutral {
+        let cost = (n_closed(&mode), n_led_back(at, &mode, meeting)?);
+        if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+            best = Some((cost, mode));
+        }
+    }
+    let Some((_, mode)) = best else {
         return Ok(Err(Stop::Contact { surfaces: all }));
     };
     let left = all.into_iter().filter(|&j| mode.entries()[j] != 0);
     let left: Lefts = left.map(Left::stays).collect();
     Ok(Ok(Next::new(mode, left)))
+}
+
+/// How many surfaces beside which a mode moves would be crossed at once if one of its contacts opened.
+fn n_led_back(at: &Point, mode: &Mode, meeting: &[usize]) -> Result<usize, FieldError> {
+    let ModeField::Contact(field) = at.field_of(mode, None) else {
+        return Ok(0);
+    };
+    let (mut row, signs, mut count) = (vec![0.0; at.x.len()], mode.signs(), 0);
+    for &k in meeting.iter().filter(|&&k| mode.entries()[k] != 0) {
+        at.system
+            .gradient(k, &at.place_at(at.t, at.x, &signs), &mut row)?;
+        let rates = field.rates_when_opened(at.t, at.x, &row)?;
+        let side = f64::from(mode.entries()[k]);
+        count += rates.iter().filter(|rate| *rate * side < 0.0).count();
+    }
+    Ok(count)
+}
+
+/// The largest speed beside these surfaces: forces that cancel on one side of a surface have their size on the other one.
+fn largest_speed(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    meeting: &[usize],
+    velocity: &[f64],
+) -> Result<f64, FieldError> {
+    let mut most = dot(velocity, velocity);
+    let mut beyond = vec![0.0; velocity.len()];
+    for &k in meeting.iter().filter(|&&k| mode.entries()[k] != 0) {
+        let signs = mode.with(k, -mode.entries()[k]).signs();
+        notes.n_field_evaluations += eval_on_side(at.system, &at.place(&signs), &mut beyond)?;
+        let square = dot(&beyond, &beyond);
+        most = if square.is_finite() {
+            most.max(square)
+        } else {
+            most
+        };
+    }
+    Ok(most.sqrt())
 }
 
 /// Do all guards of a mode begin positive? Forces, multipliers and the first derivatives of the functions that leave zero
@@ -149,6 +236,7 @@ fn begin(
         return Ok(Trial::Ends);
     }
     let (mut left, mut row, signs) = (Lefts::new(), vec![0.0; x.len()], mode.signs());
+    let speed = largest_speed(at, notes, mode, meeting, &velocity)?;
     for &j in contacts.iter().chain(meeting) {
         let entry = mode.entries()[j];
         if entry == 0 {
@@ -168,7 +256,7 @@ fn begin(
             ),
         };
         let value = of_time + dot(&row, &velocity);
-        let size = of_time.abs() + (dot(&row, &row) * dot(&velocity, &velocity)).sqrt();
+        let size = of_time.abs() + dot(&row, &row).sqrt() * speed;
         let mut leading = Leading { order, value };
         let is_tangent = value.abs() <= rounding * size;
         let has_series = is_tangent && mode.codimension() == 0;

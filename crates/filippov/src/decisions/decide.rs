@@ -51,13 +51,20 @@ fn after_event(
     mode: &Mode,
 ) -> Result<Decision, FieldError> {
     let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
-    if !is_touch && matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
-        return decide_in_contact(at, notes, fresh)
-            .map(|decided| Decision::by(Rule::Contact, decided));
-    }
     let is_trigger = |j: &usize| at.triggers().is_only_trigger(*j);
+    if !is_touch && matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
+        return match fresh.iter().any(|&j| is_solid(at, j)) {
+            true => cross_beside_triggers(at, notes, fresh),
+            false => decide_in_contact(at, notes, fresh)
+                .map(|decided| Decision::by(Rule::Contact, decided)),
+        };
+    }
     if !is_touch && fresh.len() > 1 && fresh.iter().any(is_trigger) {
         return cross_beside_triggers(at, notes, fresh);
+    }
+    if !is_touch && at.arrival.resting.iter().any(is_trigger) {
+        // A body that touches another one was held by what ends now: they may push from here.
+        return cross_beside_triggers(at, notes, &[]);
     }
     let mut both = SmallVec::<[usize; 4]>::new();
     let surfaces = match (fresh, at.arrival.sliding, at.arrival.resting) {
@@ -85,8 +92,15 @@ fn after_event(
     settle(at, notes, &meeting)
 }
 
-/// A motion in a region, or sliding, that passes surfaces of triggers in the other direction while further
-/// surfaces vanish.
+/// Does an action act at surface j on the side that the motion is on? The motion does not pass it, but for a jump.
+fn is_solid(at: &Point, j: usize) -> bool {
+    let side = at.arrival.mode.entries()[j];
+    let is_wall = at.triggers().is_only_trigger(j) && !at.triggers().is_internal(j);
+    is_wall && at.actions.triggered_at(j, side).next().is_some()
+}
+
+/// A motion that passes surfaces of triggers in the direction in which they do nothing, while further surfaces vanish, or bodies
+/// touch.
 fn cross_beside_triggers(
     at: &Point,
     notes: &mut Notes,
@@ -94,10 +108,8 @@ fn cross_beside_triggers(
 ) -> Result<Decision, FieldError> {
     let before = at.arrival.mode;
     let mut mode = before.clone();
-    for &j in surfaces
-        .iter()
-        .filter(|&&j| at.triggers().is_only_trigger(j))
-    {
+    let is_passed = |j: &&usize| at.triggers().is_only_trigger(**j) && !is_solid(at, **j);
+    for &j in surfaces.iter().filter(is_passed) {
         mode.set(j, -before.entries()[j]);
     }
     let decision = place(at, notes, Some(&mode))?;

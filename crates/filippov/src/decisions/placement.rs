@@ -1,6 +1,6 @@
 //! Where a motion starts: the mode at a given point, at the start of a run and after actions.
 
-use super::contact::place_in_contact;
+use super::contact::{add_reached_at_rest, place_in_contact};
 use super::point::{Decided, Left, Notes, Point};
 use super::rule::{Decision, Rule};
 use super::settle::place_on;
@@ -260,6 +260,7 @@ fn place_on_triggers(
     let Decision { rule, decided } = if contacts.is_empty() {
         place_on(at, notes, &mode, &meeting, memory)?
     } else {
+        let meeting = add_reached_at_rest(at, notes, &mode, &contacts, meeting)?;
         let decided = place_in_contact(at, notes, mode, &contacts, &meeting)?;
         Decision::by(Rule::Contact, decided)
     };

@@ -150,6 +150,27 @@ impl<'a> ContactField<'a> {
         Ok(impulses)
     }
 
+    /// How a function with this gradient changes when one of the contacts opens, for each of them.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn rates_when_opened(
+        &self,
+        t: f64,
+        x: &[f64],
+        row: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
+        let mut rows = Vec::with_capacity(self.contacts.len());
+        for &(j, _) in &self.contacts {
+            let mut own = vec![0.0; x.len()];
+            self.system
+                .rate_gradient(j, &self.setting.at(t, x), &mut own)?;
+            rows.push(own);
+        }
+        let impulses = self.impulses(t, x, &rows)?;
+        Ok(impulses.iter().map(|w| dot(row, w)).collect())
+    }
+
     /// The field where every surface slid on has the sign -1, and its changes to the other side of each.
     fn sides(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<Vec<f64>>), FieldError> {
         let n = x.len();
