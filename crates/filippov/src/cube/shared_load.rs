@@ -44,8 +44,8 @@ pub struct SharedLoads {
     regular: Vec<usize>,
     solver: SparseSolver,
     loops: Vec<Loop>,
-    /// The signs of these surfaces have no effect on the field; they are kinks, for instance. Each coincides with a surface that
-    /// the motion slides on.
+    /// The signs of these surfaces act on no rate; they are kinks, for instance. Each coincides with a surface that the motion
+    /// slides on.
     idle: Vec<usize>,
 }
 
@@ -80,12 +80,17 @@ impl SharedLoads {
         &self.normal
     }
 
+    /// The surfaces whose signs act on no rate.
+    pub fn idle(&self) -> &[usize] {
+        &self.idle
+    }
+
     /// The surfaces of the contacts that share a load.
     pub(super) fn loops(&self) -> impl Iterator<Item = &[usize]> {
         self.loops.iter().map(|contacts| &contacts.surfaces[..])
     }
 
-    /// Multipliers with N s = -nu, the rates being `rates` at the signs `here`; `None` if there are none, or if too many
+    /// Multipliers with N s = -nu, 0 for those that act on no rate, the rates being `rates` at the signs `here`; `None` if there are none, or if too many
     /// contacts share one load.
     pub fn at(&mut self, rates: &[f64], here: &[f64]) -> Option<SharedLoad> {
         let (mut signs, mut reserves) = (here.to_vec(), vec![None; rates.len()]);

@@ -1,6 +1,7 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
 use super::canopy::root_ends;
+use super::ties::are_parallel;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
 use crate::sparse::SparseRows;
@@ -142,6 +143,9 @@ impl<'a> AffineLaw<'a> {
         }
         let loads = self.loads.as_mut();
         self.shared = loads.and_then(|loads| loads.at(self.parts.rates(), &here));
+        if let (Some(shared), Some(loads)) = (&mut self.shared, &self.loads) {
+            follow_leaders(&self.parts.gradients, loads.idle(), &mut shared.signs);
+        }
         let Some(shared) = &self.shared else {
             dx.fill(f64::NAN);
             self.multipliers.fill(f64::NAN);
@@ -279,5 +283,27 @@ impl<'a> AffineLaw<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// Gives surfaces whose signs act on no rate the multipliers of those in whose place they are, one surface being there as Filippov has
+/// it: tangential components may jump with either sign.
+fn follow_leaders(gradients: &SparseRows, idle: &[usize], signs: &mut [f64]) {
+    let product = |i: usize, k: usize| -> f64 {
+        let other = |column: usize| gradients.row(k).find(|entry| entry.0 == column);
+        let pairs = gradients
+            .row(i)
+            .filter_map(|(column, v)| Some(v * other(column)?.1));
+        pairs.sum()
+    };
+    for &i in idle {
+        let leads = |k: &usize| {
+            let squares = product(i, i) * product(*k, *k);
+            squares > 0.0 && are_parallel(product(i, *k), squares)
+        };
+        let mut others = (0..signs.len()).filter(|k| !idle.contains(k));
+        if let Some(leader) = others.find(leads) {
+            signs[i] = product(i, leader).signum() * signs[leader];
+        }
     }
 }
