@@ -265,3 +265,63 @@ def test_an_event_on_a_count_that_reaches_the_value() -> None:
     sol = system.solve((0, 9), [0.0], events=[down, stop])
     assert sol.t_events[0].tolist() == []
     assert sol.t[-1] == 2.5
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+def test_events_read_what_holds_a_motion_on_its_surface(method: str) -> None:
+    """The force of friction while a body sticks: 0.7 lambda = 0.5 sin t, with the two forces in balance."""
+    force = lambda t, x: 0.7 * np.sign(x[1]) - 0.3  # noqa: E731
+    sticking = lambda t, x: [x[1], 0.5 * np.sin(t) - 0.7 * np.sign(x[1])]  # noqa: E731
+    sol = fl.solve_ivp(sticking, (0, 7), [0.0, 0.0], events=force, method=method)
+    first = np.arcsin(0.6)
+    np.testing.assert_allclose(sol.t_events[0], [first, np.pi - first, 2 * np.pi + first], atol=1e-7)
+    # A force that jumps through zero as the body begins to stick or to slip.
+    moving = lambda t, x: [x[1], -x[0] + 1.2 * np.cos(0.7 * t) - 0.6 * np.sign(x[1])]  # noqa: E731
+    force = lambda t, x: -0.6 * np.sign(x[1]) - 0.3  # noqa: E731
+    sol = fl.solve_ivp(moving, (0, 30), [0.3, 0.5], events=force, method=method, rtol=1e-10, atol=1e-12)
+    t = np.linspace(0, 30, 100_001)
+    signs = np.sign(sol.evaluate(force, t))
+    changes = t[np.flatnonzero(np.diff(signs))]
+    assert len(changes) == 7
+    np.testing.assert_allclose(sol.t_events[0], changes, atol=5e-4)
+
+
+CIRCLE: Any = lambda t, x: [  # noqa: E731
+    x[1] - x[0] * np.sign(x[0] ** 2 + x[1] ** 2 - 1),
+    -x[0] - x[1] * np.sign(x[0] ** 2 + x[1] ** 2 - 1),
+]
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-8])
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda t, x: np.hypot(x[0], x[1]) - 1,
+        lambda t, x: np.exp(x[0] ** 2 + x[1] ** 2 - 1) - 1,
+        lambda t, x: (x[0] ** 2 + x[1] ** 2 - 1) * (1 + abs(x[0] - 3)),
+    ],
+)
+def test_an_event_that_vanishes_on_the_surface_slid_on_is_one(event: Any, method: str, rtol: float) -> None:
+    sol = fl.solve_ivp(CIRCLE, (0, 8), [0.5, 0.0], events=event, method=method, rtol=rtol)
+    np.testing.assert_allclose(sol.t_events[0], [np.log(2)], atol=2 * rtol)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+def test_the_relative_speed_of_a_contact_has_no_zeros_while_it_lasts(method: str) -> None:
+    table = fl.Reset(
+        lambda t, x: x[0] - 0.02 * np.sin(t), lambda t, x: [x[0], -0.5 * x[1] + 0.03 * np.cos(t)]
+    )
+    sol = fl.solve_ivp(
+        lambda t, x: [x[1], -1.0],
+        (0, 12),
+        [1.0, 0.0],
+        resets=table,
+        events=lambda t, x: x[1] - 0.02 * np.cos(t),
+        method=method,
+        max_steps=20_000,
+    )
+    assert sol.success
+    # One at the top of each flight, and no other: two between impacts at most.
+    assert 10 < len(sol.t_events[0]) < 20
+    assert sol.t_events[0][-1] < sol.switches[-1].t + 1e-6

@@ -43,6 +43,8 @@ class Event:
     Notes
     -----
     Functions with SciPy's attributes ``terminal`` and ``direction`` are accepted by `solve_ivp` as they are.
+    While the motion slides on a surface, its sign in `g` is what holds the motion there, as for
+    `Solution.evaluate`: the force of friction while a body sticks.
 
     Examples
     --------

@@ -514,6 +514,20 @@ impl UserFunction for CompiledEvent {
         let index = index as usize;
         (index < self.system.n_surfaces()).then_some((index, sense))
     }
+
+    fn reads(&self, surface: usize) -> bool {
+        self.expression.surfaces.contains(&surface)
+    }
+
+    fn value_held(&self, at: (f64, &[f64]), piece: &Piece, held: &Held) -> Result<f64, FieldError> {
+        let signal = Signal {
+            expression: &self.expression,
+            velocity: None,
+            side: Side::Right,
+            contacts: &[],
+        };
+        Ok(signal.value(at, self.system.parameters(), piece, held))
+    }
 }
 
 impl SmoothParts for CompiledEvent {

@@ -116,12 +116,12 @@ pub use inspect::{
 };
 pub use integrate::{Integrator, Problem, Reached, ReplayError};
 pub use mode::{Mode, Signs};
+pub use motion::{as_multiplier, Held, Piece};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{
-    as_multiplier, replay_decision, section, Columns, DecisionCause, DecisionOutcome,
-    DecisionPoint, DecisionRecord, EndOnly, Gradient, Held, InstantRecord, ObservedStep, Observer,
-    Piece, Rows, Segment, SegmentColumns, Segments, Side, Solution, StartingZero, SwitchColumns,
-    Switches,
+    replay_decision, section, Columns, DecisionCause, DecisionOutcome, DecisionPoint,
+    DecisionRecord, EndOnly, Gradient, InstantRecord, ObservedStep, Observer, Rows, Segment,
+    SegmentColumns, Segments, Side, Solution, StartingZero, SwitchColumns, Switches,
 };
 pub use saved::{ReadySystem, RunnableSystem, SavedAction, SavedSystem};
 pub use stats::Stats;

@@ -5,7 +5,7 @@ use filippov_expr::{Enclosure, Motion};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::motion::Guard;
+use crate::motion::{Guard, Held, Piece};
 use crate::system::{Place, Setting};
 
 /// What the event stage says of a step.
@@ -83,6 +83,26 @@ pub trait UserFunction {
     /// at that surface, and nowhere else.
     fn surface(&self) -> Option<(usize, f64)> {
         None
+    }
+
+    /// Does g contain the sign of this surface? Where the motion slides on it, [`value_held`](Self::value_held) is asked.
+    fn reads(&self, surface: usize) -> bool {
+        let _ = surface;
+        false
+    }
+
+    /// The value of g at a place of a motion that slides on surfaces whose signs it contains: these are what holds the motion there.
+    ///
+    /// # Errors
+    /// If the function raises.
+    fn value_held(
+        &self,
+        (t, x): (f64, &[f64]),
+        piece: &Piece,
+        held: &Held,
+    ) -> Result<f64, FieldError> {
+        let _ = held;
+        self.value(t, x, &piece.discrete)
     }
 }
 

@@ -3,7 +3,6 @@
 mod columns;
 mod decision_record;
 mod end_only;
-mod held;
 mod kinks;
 mod observer;
 mod recorder;
@@ -18,7 +17,6 @@ pub use decision_record::{
     replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
 };
 pub use end_only::EndOnly;
-pub use held::{as_multiplier, Held, Piece};
 pub use observer::{Gradient, InstantRecord, ObservedStep, Observer};
 pub(crate) use observer::{KeptInstant, Observed};
 pub(crate) use recorder::Recorder;

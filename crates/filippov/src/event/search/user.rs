@@ -12,6 +12,8 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::{AtEnd, SmoothParts, StepEnd, UserEvents, UserFunction};
 use crate::mode::Signs;
+use crate::motion::Piece;
+use crate::page::IS_PAGE;
 use crate::stepper::Interpolant;
 use crate::tolerances::{
     MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
@@ -132,6 +134,10 @@ impl StepSearch<'_, '_> {
         theta: f64,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         let mut zeros = Vec::new();
+        if IS_PAGE {
+            // It has no functions of a user.
+            return Ok(Some(zeros));
+        }
         for index in 0..events.events.len() {
             if !self.add_zeros(events, index, theta, &mut zeros)? || zeros.len() > MOST_ZEROS {
                 return Ok(None);
@@ -185,16 +191,47 @@ impl StepSearch<'_, '_> {
             may_have_jumped: false,
             has_jumped_to_zero: false,
         };
-        let Some(parts) = function.parts() else {
-            let along = Source::Sampled(function);
-            let Some((changes, side)) = self.changes_along(along, &Cuts::none(0), theta, start)?
-            else {
+        let held = self.piece_held(function);
+        let is_on_surfaces = held.is_none() && self.run.motion.mode.codimension() > 0;
+        if is_on_surfaces && self.stays_zero(function, theta)? {
+            if !start.is_known_zero {
+                add(0.0, start.before);
+            }
+            events.at_end.borrow_mut()[index] = AtEnd {
+                side: 0.0,
+                value: 0.0,
+            };
+            return Ok(true);
+        }
+        let sampled = match &held {
+            Some(piece) => {
+                let source = Source::Held(function, piece);
+                let here = Along::new(source, &Signs::new(), self).value(self, 0.0)?;
+                start.is_known_zero = was_zero || here == 0.0;
+                // The signs jump where sliding begins.
+                let before = events.sides[index];
+                start.may_have_jumped = events.may_have_jumped || before != 0.0;
+                start.before = match start.may_have_jumped {
+                    true => before,
+                    false => side(here),
+                };
+                Some(source)
+            }
+            None if function.parts().is_none() => Some(Source::Sampled(function)),
+            None => None,
+        };
+        if let Some(along) = sampled {
+            let none = Cuts::none(0);
+            let Some((changes, side)) = self.changes_along(along, &none, theta, start)? else {
                 return Ok(false);
             };
             changes
                 .iter()
                 .for_each(|change| add(change.at, change.before));
             events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
+            return Ok(true);
+        }
+        let Some(parts) = function.parts() else {
             return Ok(true);
         };
         if parts.n_inner() == 0 && !events.may_have_jumped {
@@ -236,6 +273,19 @@ impl StepSearch<'_, '_> {
             .for_each(|change| add(change.at, change.before));
         events.at_end.borrow_mut()[index] = AtEnd::of_side(side);
         Ok(true)
+    }
+
+    /// The piece of motion that says what holds it, if the function reads the sign of a surface slid on.
+    fn piece_held(&self, function: &dyn UserFunction) -> Option<Piece> {
+        let motion = &self.run.motion;
+        let mut sliding = motion.mode.sliding_set();
+        sliding.any(|j| function.reads(j)).then(|| Piece {
+            mode: motion.mode.clone(),
+            discrete: motion.discrete.clone(),
+            sides: motion.sides.to_vec(),
+            near: motion.multipliers().to_vec(),
+            start: self.run.x.clone(),
+        })
     }
 
     /// Does the motion arrive at a surface at the end of the step? `None` if nothing looks for that.

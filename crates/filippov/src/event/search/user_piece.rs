@@ -13,9 +13,10 @@ use crate::event::tube::Tube;
 use crate::event::{SmoothParts, UserFunction};
 use crate::locate::refine;
 use crate::mode::Signs;
-use crate::motion::CurrentMotion;
+use crate::motion::{CurrentMotion, Piece};
+use crate::options::SlidingRule;
 use crate::stepper::{powers_of_nested, Basis, Interpolant};
-use crate::system::Setting;
+use crate::system::{Actions, PiecewiseSystem, Setting};
 use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH_BESIDE_ROOT, EPS, POLE, ROUNDING};
 
 /// The value of a user's function along the motion.
@@ -65,6 +66,8 @@ pub(super) enum Outcome {
 pub(super) enum Source<'f> {
     /// A function of which only values are known.
     Sampled(&'f dyn UserFunction),
+    /// One that reads the signs of surfaces slid on; they are what holds this piece of motion.
+    Held(&'f dyn UserFunction, &'f Piece),
     /// A part of a function.
     Part(&'f dyn SmoothParts, usize),
 }
@@ -139,8 +142,11 @@ fn zeros_of_series(rows: &[f64], search: &StepSearch, start: Start, to: f64) -> 
 }
 
 /// A function along a piece of a step.
-pub(super) struct Along<'f> {
+pub(super) struct Along<'f, 'a> {
     source: Source<'f>,
+    system: &'a dyn PiecewiseSystem,
+    actions: &'a Actions<'a>,
+    rule: SlidingRule,
     signs: Signs,
     /// Its series along the step, if it is affine.
     series: Option<SmallVec<[f64; 32]>>,
@@ -148,10 +154,14 @@ pub(super) struct Along<'f> {
     y: RefCell<SmallVec<[f64; 8]>>,
 }
 
-impl<'f> Along<'f> {
-    pub fn new(source: Source<'f>, signs: &Signs, search: &mut StepSearch) -> Self {
+impl<'f, 'a> Along<'f, 'a> {
+    pub fn new(source: Source<'f>, signs: &Signs, search: &mut StepSearch<'_, 'a>) -> Self {
+        let run = &search.run;
         let mut along = Along {
             source,
+            system: run.system,
+            actions: run.actions,
+            rule: run.options.sliding,
             signs: signs.clone(),
             series: None,
             y: RefCell::new(smallvec![0.0; search.run.x.len()]),
@@ -166,13 +176,13 @@ impl<'f> Along<'f> {
     }
 
     pub fn is_sampled(&self) -> bool {
-        matches!(self.source, Source::Sampled(_))
+        !matches!(self.source, Source::Part(..))
     }
 
     /// Is it a smooth function of a user? Of one in pieces the sign behind the end of a step is asked for in the next one.
     pub fn is_smooth(&self) -> bool {
         match self.source {
-            Source::Sampled(_) => true,
+            Source::Sampled(_) | Source::Held(..) => true,
             Source::Part(parts, _) => parts.n_inner() == 0,
         }
     }
@@ -197,6 +207,14 @@ impl<'f> Along<'f> {
             (Some(rows), _) => return Ok(Series::new(rows).value(theta)),
             (None, Source::Sampled(function)) => {
                 return value_along(function, interpolant, motion, theta)
+            }
+            (None, Source::Held(function, piece)) => {
+                let t = interpolant.t0 + theta * interpolant.dt;
+                let mut y = self.y.borrow_mut();
+                interpolant.at(theta, &mut y);
+                motion.project(t, &mut y)?;
+                let held = piece.held(self.system, self.actions, self.rule, (t, &y))?;
+                return function.value_held((t, &y), piece, &held);
             }
             (None, Source::Part(parts, part)) => (parts, part),
         };
@@ -240,7 +258,7 @@ impl<'f> Along<'f> {
         sign: f64,
     ) -> Option<Bound> {
         let (parts, part) = match (&self.series, self.source) {
-            (_, Source::Sampled(_)) => return None,
+            (_, Source::Sampled(_) | Source::Held(..)) => return None,
             (Some(rows), _) => {
                 let Bound { value, slope } = Series::new(rows).bound(a, b);
                 return Some(Bound {
@@ -257,6 +275,40 @@ impl<'f> Along<'f> {
 }
 
 impl StepSearch<'_, '_> {
+    /// Is a function zero all along the step, up to rounding, as one is that vanishes on the surfaces slid on?
+    pub(super) fn stays_zero(
+        &mut self,
+        function: &dyn UserFunction,
+        theta: f64,
+    ) -> Result<bool, FieldError> {
+        let Some(parts) = function.parts() else {
+            return Ok(false);
+        };
+        let mut y: SmallVec<[f64; 8]> = smallvec![0.0; self.run.x.len()];
+        for share in [1.0, 0.5, 0.25, 0.1] {
+            let (at, motion) = (share * theta, &mut self.run.motion);
+            let interpolant = self.stepper.interpolant();
+            let t = interpolant.t0 + at * interpolant.dt;
+            interpolant.at(at, &mut y);
+            motion.project(t, &mut y)?;
+            let mut signs: Signs = smallvec![0.0; parts.n_inner()];
+            for part in 0..parts.n_inner() {
+                let place = Setting::new(&signs, &motion.discrete).at(t, &y);
+                signs[part] = parts.value(part, &place).signum();
+            }
+            let setting = Setting::new(&signs, &motion.discrete);
+            let value = parts.value(parts.n_inner(), &setting.at(t, &y));
+            let tube = Tube::new(interpolant, (at, at), &self.detector.margin);
+            let bound = parts.enclose(parts.n_inner(), &tube, setting).value;
+            // A value that does not exist is no zero.
+            let is_zero = value.abs() <= bound.hi - bound.lo;
+            if !is_zero {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// The zeros up to `to` of a smooth affine function that has this value at the start, as its series tells them. The second
     /// result is the value at the end of the step, NaN if `to` is before it.
     pub(super) fn zeros_of_affine(

@@ -1,7 +1,7 @@
 //! What a run leaves at its section.
 
 use crate::mode::Mode;
-use crate::record::Piece;
+use crate::motion::Piece;
 
 /// A return to the section.
 #[derive(Clone, Debug, Default, PartialEq)]

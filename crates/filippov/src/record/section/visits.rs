@@ -6,7 +6,7 @@ use super::cycle::Cycle;
 use super::returns::{Return, Returns};
 use super::{Place, Section};
 use crate::mode::Mode;
-use crate::record::Piece;
+use crate::motion::Piece;
 use crate::status::Stop;
 use crate::switch::Kind;
 use crate::switch::Switch;

@@ -1,8 +1,8 @@
 //! What holds a motion on its surfaces: multipliers of sliding, and the accelerations that contacts give.
 
+use super::{ContactField, IntersectionField, Motion, SlidingField, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{ContactField, IntersectionField, Motion, SlidingField, SmoothField};
 use crate::options::SlidingRule;
 use crate::system::{dot_magnitude, Actions, PiecewiseSystem, Setting};
 use crate::tolerances::{AT_SIDE, TANGENT};
