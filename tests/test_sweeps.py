@@ -387,3 +387,47 @@ def test_a_missing_package_is_named(friction: fl.System, monkeypatch: pytest.Mon
         diagram(friction)
     with pytest.raises(ImportError, match="pip install xarray"):
         fl.poincare(friction, "v", (0, 10), [1.0, 2.0])
+
+
+def test_what_is_followed_hands_on_its_relays_and_discrete_states() -> None:
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.5, 0.5)
+    one = fl.System(lambda t, x, a=1.0: [a - x[0] - 0.2 * relay(t, x)], states=("x",))
+    resets = [
+        fl.Reset(lambda t, x: x[0] + 0.5, set={"q": lambda t, x: -1.0}, direction="down"),
+        fl.Reset(lambda t, x: x[0] - 0.5, set={"q": lambda t, x: 1.0}, direction="up"),
+    ]
+    other = fl.System(
+        lambda t, x, q, a=1.0: [a - x[0] - 0.2 * q], states=("x",), discrete={"q": -1.0}, resets=resets
+    )
+    values = {"a": [1.0, 0.6, 0.3, 0.0, -0.3]}
+    for system in (one, other):
+        for chunk_size in (None, 2):
+            options = {} if chunk_size is None else {"chunk_size": chunk_size}
+            found = fl.sweep(system, (0, 50), [0.0], values, follow="a", **options)
+            np.testing.assert_allclose(found.x, [0.8, 0.4, 0.1, -0.2, -0.5], atol=1e-6)
+    # A start that belongs to the points is taken.
+    found = fl.sweep(other, (0, 1e-3), [0.0], {"q": [1.0, -1.0, 1.0], "a": 0.0}, follow="q")
+    np.testing.assert_allclose(np.diff(found.x, prepend=0.0), [-2e-4, 2e-4, -2e-4], rtol=1e-2)
+
+
+def test_the_start_of_a_followed_point_is_no_return() -> None:
+    belt = fl.System(
+        lambda t, x, F=1.0: [x[1], -x[0] - F * np.sign(x[1] - 0.2) / (1 + 2 * abs(x[1] - 0.2))],
+        states=("y", "v"),
+    )
+    section = fl.Section(lambda t, x: x[0] ** 3 - 0.001, "up")
+    found = fl.sweep(belt, (0, 60), [0.0, 0.2], {"F": [1.0, 1.0]}, section=section, n=3, follow="F")
+    periods = np.diff(found.t.values.reshape(2, 3), axis=1)
+    np.testing.assert_allclose(periods, periods[0, 0], rtol=1e-6)
+    np.testing.assert_allclose(found.return_time.values.reshape(2, 3)[1], periods[0, 0], rtol=1e-6)
+
+
+def test_wrong_moduli_of_basins_without_a_section_are_named() -> None:
+    pendulum = fl.System(lambda t, x: [x[1], -np.sin(x[0]) - 0.3 * x[1]], states=("th", "w"))
+    starts = [[0.1, 0.0], [6.3, 0.0], [-6.3, 0.0]]
+    with pytest.raises(fl.InputError, match="modulo: the system has no state 'x'"):
+        fl.basins(pendulum, None, (0, 80), starts, modulo={"x": 1})
+    with pytest.raises(fl.InputError, match="modulo: a positive number is needed for th"):
+        fl.basins(pendulum, None, (0, 80), starts, modulo={"th": 0})
+    found = fl.basins(pendulum, None, (0, 80), starts, modulo={"th": 2 * np.pi})
+    assert found.attractor.values.tolist() == [0, 0, 0]

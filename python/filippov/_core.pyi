@@ -390,6 +390,7 @@ def solve_points(
     section: dict[str, Any] | None,
     outputs: list[tuple[TracedSystem, list[int]]],
     threads: int,
+    memory: _Array | None,
 ) -> dict[str, Any]: ...
 def replay_decision(
     system: TracedSystem | OpaqueSystem | SignedSystem,

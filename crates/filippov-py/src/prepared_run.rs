@@ -91,6 +91,15 @@ impl PreparedRun {
         })
     }
 
+    /// The same from where another run ended, which left its discrete states so.
+    pub fn going_on(mut self, t0: f64, before: &[f64]) -> PyResult<Self> {
+        if let (Some(laws), Some(system)) = (&self.all_laws, &self.compiled) {
+            let found = laws.go_on(system, (t0, &self.y0), before);
+            self.discrete = found.map_err(raised)?;
+        }
+        Ok(self)
+    }
+
     /// Runs; `interrupt` is asked now and then with the time reached.
     pub fn run(
         &self,

@@ -24,7 +24,8 @@ type Outcome = Result<Solution, Error>;
 
 /// Integrates from many initial states, the rows of `y0`, over the spans in the rows of `spans`, with the parameters
 /// in the rows of `p`; a run that cannot even start has a status like any other. Where a signal raised, the exception
-/// stands under `raised`, and the runs that were not begun have the reason `not_run`.
+/// stands under `raised`, and the runs that were not begun have the reason `not_run`. The rows of `memory` are discrete states that
+/// other runs left; those of the last return, or of the end, are under `memory_last`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn solve_points<'py>(
@@ -38,12 +39,16 @@ pub fn solve_points<'py>(
     section: Option<Bound<'py, PyDict>>,
     outputs: Vec<(Bound<'py, TracedSystem>, Vec<usize>)>,
     threads: usize,
+    memory: Option<PyReadonlyArray2<'py, f64>>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let memory = memory.as_ref().map(|memory| memory.as_array());
     let (spans, y0, p) = (spans.as_array(), y0.as_array(), p.as_array());
     let section = section.map(|given| SectionSpec::read(&system, &given));
     let mut section = section.transpose()?;
+    let traced = system.cast::<TracedSystem>();
+    let has_memory = traced.is_ok_and(|traced| traced.get().laws.have_memory());
     if let Some(section) = &mut section {
-        section.keeps_pieces = !outputs.is_empty();
+        section.keeps_pieces = !outputs.is_empty() || has_memory;
     }
     let outputs = outputs
         .iter()
@@ -54,7 +59,10 @@ pub fn solve_points<'py>(
     for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
         let prepare = |&row: &usize| {
             let (y0, p) = (y0.row(row).to_vec(), p.row(row).to_vec());
-            let run = PreparedRun::new(&system, spans[[row, 0]], y0, p, &[], &actions)?;
+            let mut run = PreparedRun::new(&system, spans[[row, 0]], y0, p, &[], &actions)?;
+            if let Some(memory) = &memory {
+                run = run.going_on(spans[[row, 0]], &memory.row(row).to_vec())?;
+            }
             let place = section.as_ref().map(|section| section.at(&run, row));
             Ok((run, place, (spans[[row, 0]], spans[[row, 1]])))
         };
@@ -337,6 +345,8 @@ struct Points {
     message: Vec<String>,
     t_last: Vec<f64>,
     y_last: Vec<f64>,
+    /// The discrete states at the last return, or at the end.
+    memory_last: Vec<Vec<f64>>,
     n_steps: Vec<i64>,
     n_switches: Vec<i64>,
     n_warnings: Vec<i64>,
@@ -397,6 +407,12 @@ impl Points {
         self.t_last.push(solution.t_last);
         self.y_last.extend_from_slice(solution.last_state());
         let returns = solution.returns.take().unwrap_or_default();
+        let last = returns.kept.last().map(|kept| kept.piece.as_deref());
+        let last = last.map_or_else(
+            || solution.last_piece().discrete,
+            |piece| piece.map_or_else(Vec::new, |piece| piece.discrete.clone()),
+        );
+        self.memory_last.push(last);
         if self.n_outputs > 0 {
             let end = (solution.t_last, solution.last_state());
             let last = signals.values(run, solution.sliding, end, solution.last_piece());
@@ -422,6 +438,7 @@ impl Points {
 
     fn nothing(&mut self, t0: f64) {
         self.t_last.push(t0);
+        self.memory_last.push(Vec::new());
         self.y_last
             .resize(self.y_last.len() + self.n_states, f64::NAN);
         self.outputs_last
@@ -473,6 +490,7 @@ impl Points {
             PyArray1::from_vec(py, values).reshape([rows, columns])
         };
         dict.set_item("y_last", table(self.y_last, n_points, self.n_states)?)?;
+        dict.set_item("memory_last", self.memory_last)?;
         dict.set_item("y", table(self.y, n_kept, self.n_states)?)?;
         let outputs_last = table(self.outputs_last, n_points, self.n_outputs)?;
         dict.set_item("outputs_last", outputs_last)?;

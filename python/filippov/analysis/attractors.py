@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov.analysis.observe import check_keywords
+from filippov.analysis.grid import grid_of
+from filippov.analysis.observe import check_keywords, check_system, moduli_of
 from filippov.analysis.sweeps import sweep
 from filippov.errors import FilippovWarning, InputError, Interrupted
 
@@ -88,12 +89,13 @@ def basins(
         raise InputError("until_periodic: has no place here; a run of basins() ends when its returns repeat")
     returns: dict[str, Any] = {"n": n, "until_periodic": True, "modulo": modulo}
     given = returns if section is not None else {}
+    moduli = np.array(moduli_of(modulo, grid_of(check_system(system), y0, params).states))
     atol, rtol = arguments.get("atol", 1e-9), float(arguments.get("rtol", 1e-6))
     nearness = 1000.0 * rtol if resolution is None else float(resolution)
 
     def numbered(found: Any) -> Any:
         weight = np.asarray(atol, dtype=np.float64) / rtol
-        return _with_attractors(found, section is not None, nearness, weight, modulo or {})
+        return _with_attractors(found, section is not None, nearness, weight, moduli)
 
     try:
         found = sweep(system, t_span, y0, params, section=section, **given, **arguments)
@@ -107,13 +109,10 @@ def basins(
     return None if found is None else numbered(found)
 
 
-def _with_attractors(
-    found: Any, has_section: bool, nearness: float, weight: Any, modulo: Mapping[Any, float]
-) -> Any:
+def _with_attractors(found: Any, has_section: bool, nearness: float, weight: Any, moduli: Array) -> Any:
     """Add the attractors of its points to the Dataset of a sweep, and return it."""
     states = json.loads(found.attrs["states"])
     weight = np.broadcast_to(weight, len(states))
-    moduli = np.array([float(modulo.get(name, modulo.get(i, 0.0))) for i, name in enumerate(states)])
     failed = found.status.values.ravel() < 0
     if not has_section:
         orbits = np.column_stack([found[name].values.ravel() for name in states])

@@ -18,7 +18,7 @@ from filippov.unknown import did_you_mean, refuse_former
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["check_keywords", "check_system", "observation_of", "options_of", "span_of"]
+__all__ = ["check_keywords", "check_system", "moduli_of", "observation_of", "options_of", "span_of"]
 
 _OWN = {
     "keep": "what is kept is decided by the section",
@@ -138,11 +138,18 @@ def observation_of(
     # The weights of the states are those of the error control: atol + rtol |x|.
     atol = np.broadcast_to(options.atol, len(states)) * (float(tolerance) / options.rtol)
     longest = _count("longest_period", longest_period, 1)
-    cycle = (float(tolerance), atol.tolist(), _moduli(modulo, states), longest, bool(until_periodic))
+    cycle = (float(tolerance), atol.tolist(), moduli_of(modulo, states), longest, bool(until_periodic))
     return Observation(as_section(section), _count("transient", transient, 0), most, cycle)
 
 
-def _moduli(modulo: Mapping[Any, float] | None, states: tuple[str, ...]) -> list[float]:
+def moduli_of(modulo: Mapping[Any, float] | None, states: tuple[str, ...]) -> list[float]:
+    """Return the number up to a multiple of which each state counts; 0 where all of it does.
+
+    Raises
+    ------
+    InputError
+        If a state is unknown, or a number is not positive.
+    """
     moduli = [0.0] * len(states)
     for name, value in (modulo or {}).items():
         index = states.index(name) if name in states else name

@@ -54,8 +54,11 @@ class Chunk(NamedTuple):
         What is to be run; tables of points that could not even be prepared.
     follows : bool
         Whether every point starts from the state that the one before it left.
-    carry : ndarray, shape (n,), or None
-        The state that the point before the first left; None at the start of a line.
+    carry : ndarray, shape (n + n_laws,), or None
+        The state that the point before the first left, and its discrete states behind; None at the start of a
+        line.
+    given : tuple of int
+        The discrete states whose values at the start belong to the points.
     stop : Event or None
         Set where the sweep was interrupted, in the same process.
     """
@@ -63,11 +66,12 @@ class Chunk(NamedTuple):
     parts: tuple[Task | Table, ...]
     follows: bool
     carry: Array | None
+    given: tuple[int, ...] = ()
     stop: Event | None = None
 
 
 def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
-    """Run the points of a chunk; return their table, and the state left to the point after the last.
+    """Run the points of a chunk; return their table, and what is left to the point after the last.
 
     Raises
     ------
@@ -104,13 +108,16 @@ def _run_parts(chunk: Chunk, tables: list[Table]) -> Array | None:
         for row in range(len(part.y0)):
             if chunk.stop is not None and chunk.stop.is_set():
                 raise Interrupted
-            one = part.rows(slice(row, row + 1))
+            one, n = part.rows(slice(row, row + 1)), part.y0.shape[1]
             if carry is not None:
-                one = one._replace(y0=carry[np.newaxis])
+                memory = carry[n:].copy()
+                memory[list(chunk.given)] = np.nan
+                one = one._replace(y0=carry[np.newaxis, :n], memory=memory[np.newaxis])
             table = _kept(one, tables)
             # A point that fails hands on what it was given.
             if table["status"][0] >= 0:
-                carry = table["y"][-1] if len(table["y"]) else table["y_last"][0]
+                last = table["y"][-1] if len(table["y"]) else table["y_last"][0]
+                carry = np.append(last, table["memory_last"][0])
             tables.append(table)
     return carry
 
@@ -247,7 +254,8 @@ class Plan(NamedTuple):
                 threads,
             )
             parts.append(task.travelling() if travels else task)
-        return Chunk(tuple(parts), self.follows, carry)
+        given = [k for k, name in enumerate(self.system.discrete) if name in self.grid.dims]
+        return Chunk(tuple(parts), self.follows, carry, tuple(given))
 
     def left_out(self, piece: Piece) -> Table:
         """Return the table of a piece that was not begun."""

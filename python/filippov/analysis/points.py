@@ -83,6 +83,8 @@ class Task(NamedTuple):
     outputs : tuple of Output
         The outputs of the system that are wanted.
     threads : int
+    memory : ndarray, shape (n_points, n_laws), or None
+        Discrete states that other runs left; NaN, and None: as at any start.
     """
 
     system: Prepared | bytes
@@ -96,6 +98,7 @@ class Task(NamedTuple):
     limits: tuple[Any, ...]
     outputs: tuple[Output, ...]
     threads: int
+    memory: Array | None = None
 
     def rows(self, chosen: slice) -> Task:
         """Return the same task for some of the points."""
@@ -136,6 +139,8 @@ def _function(data: bytes) -> TracedSystem:
 
 def run_task(task: Task) -> Table:
     """Do the runs of a task; the rows of the table are in the order of the points.
+
+    Beside its columns it has ``memory_last``: lists of the discrete states at the last return, or at the end.
 
     Raises
     ------
@@ -190,6 +195,7 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
         section,
         [(output.function, list(output.contacts)) for output in task.outputs],  # type: ignore[misc]
         task.threads,
+        task.memory,
     )
     raised = table.pop("raised")
     for code, _ in prepared.warnings:

@@ -70,8 +70,11 @@ def sweep(
         As in `poincare`.
     follow : str or bool, optional
         Follow the attractor: along this dimension (True: the last one) every point starts from the state that
-        the one before it left, the last return to the section or else the end. The order of the values is the
-        direction. A point that fails hands on the state that it was given.
+        the one before it left, the last return to the section or else the end. Discrete states and relays go
+        on too, unless their values at the start are given along this dimension. The order of the values is
+        the direction. A point that fails hands on the state that it was given. In a system that depends on
+        the time take the section `Phase`: at another one every point starts anew at ``t_span[0]``, at another
+        phase.
     units : mapping, optional
         Units of states, of parameters, and of the time under ``"t"``; they become attributes.
     store : str or path, optional

@@ -8,6 +8,7 @@ use crate::error::FieldError;
 use crate::event::search::StepSearch;
 use crate::event::{StepEnd, TICK};
 use crate::status::Stop;
+use crate::tolerances::ROUNDING;
 
 impl Recorder<'_> {
     /// The zeros (theta, index) of the user's functions up to `theta`, in order; `None` if a shorter step is needed to tell
@@ -52,6 +53,12 @@ impl Recorder<'_> {
         let extension = search.stepper.interpolant();
         let (t0, dt) = (extension.t0, extension.dt);
         for (at, index) in zeros {
+            // The start is no return to the section, up to rounding.
+            let is_start = self.user_events.at_start && self.user_events.is_section;
+            if is_start && index != TICK && at <= ROUNDING {
+                self.user_events.last[index] = t0;
+                continue;
+            }
             let t = match &mut self.visits {
                 Some(visits) if index == TICK => {
                     let tick = visits.next_tick().unwrap_or(t_stop);

@@ -316,10 +316,29 @@ impl Laws {
     /// # Errors
     /// If a function of the user raises.
     pub fn start(&self, system: &TracedSystem, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
+        self.go_on(system, (t, x), &[])
+    }
+
+    /// The discrete states at a start at (t, x) where another motion ends: those with a memory are as it left them. One that is not
+    /// known, or NaN, is as at any start.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn go_on(
+        &self,
+        system: &TracedSystem,
+        at: (f64, &[f64]),
+        before: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
         let mut q = vec![0.0; self.laws.len()];
         let all: Vec<usize> = (0..q.len()).collect();
-        self.settle(system, (t, x), &all, &mut q)?;
+        self.settle(system, at, &all, before, &mut q)?;
         Ok(q)
+    }
+
+    /// Does one of the discrete states depend on the past, beside the point?
+    pub fn have_memory(&self) -> bool {
+        self.laws.iter().any(Law::has_memory)
     }
 
     /// Brings the discrete states that a run does not follow up to date with a point of it.
@@ -332,15 +351,16 @@ impl Laws {
         (t, x): (f64, &[f64]),
         q: &mut [f64],
     ) -> Result<(), FieldError> {
-        self.settle(system, (t, x), &self.idle(), q)
+        self.settle(system, (t, x), &self.idle(), &[], q)
     }
 
-    /// Sets some discrete states to what they are at a start at (t, x).
+    /// Sets some discrete states to what they are at a start at (t, x), with what is remembered of them.
     fn settle(
         &self,
         system: &TracedSystem,
         (t, x): (f64, &[f64]),
         indices: &[usize],
+        remembered: &[f64],
         q: &mut [f64],
     ) -> Result<(), FieldError> {
         if indices.is_empty() {
@@ -354,6 +374,7 @@ impl Laws {
             for &index in indices {
                 let out = self.eval(t, x, &signs, system.parameters(), q);
                 let values = [out[3 * index], out[3 * index + 1], out[3 * index + 2]];
+                let memory = remembered.get(index).copied().filter(|q| !q.is_nan());
                 q[index] = match &self.laws[index] {
                     Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
                     Law::Level { .. } => values[0].round(),
@@ -362,8 +383,8 @@ impl Laws {
                     } => passed(knots, values[0], values[1]),
                     Law::Piece { knots, .. } => passed(knots, values[0], 1.0),
                     Law::Held { step, .. } => step.at(values[0]),
-                    Law::Named { .. } => values[0],
-                    Law::Hysteresis { initial, .. } => relay(values, *initial),
+                    Law::Named { .. } => memory.unwrap_or(values[0]),
+                    Law::Hysteresis { initial, .. } => relay(values, memory.unwrap_or(*initial)),
                 };
             }
             system.surfaces(&Setting::new(&signs, q).at(t, x), &mut h)?;
