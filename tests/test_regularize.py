@@ -71,7 +71,7 @@ def test_kinks_become_smooth() -> None:
     smooth = system.regularize(0.2)
     x, y = 0.3, 0.1
     first, second = np.tanh(x / 0.2), np.tanh((x - y) / 0.2)
-    larger = 0.5 * (x + y) + second * 0.5 * (x - y)
+    larger = x * (0.5 + 0.5 * second) + y * (0.5 - 0.5 * second)
     np.testing.assert_allclose(at(smooth, [x, y]), [x * first - larger, -y], rtol=1e-14)
 
 
@@ -138,3 +138,35 @@ def test_wrong_arguments_are_refused() -> None:
         system.regularize(0.1, kappa=-1.0)
     with pytest.raises(fl.InputError, match="parameter of this name"):
         system.regularize(0.1).regularize(0.1)
+
+
+@pytest.mark.parametrize("kind", ["tanh", "linear"])
+@pytest.mark.parametrize("choice", [lambda h: 2 + np.sign(h), lambda h: np.where(h > 0, 3.0, 1.0)])
+def test_functions_of_a_sign_become_the_mean_of_both_sides(choice: Any, kind: str) -> None:
+    """The limit is Filippov's motion: 3/4 of one field and 1/4 of the other one."""
+    fast = fl.System(lambda t, x: [1 / choice(x[0] - 1) - 0.5, 1 / choice(x[0] - 1) ** 2], n=2)
+    assert fast.solve((0, 10), [1.0, 0.0]).y[1, -1] == pytest.approx(10 / 3, abs=1e-9)
+    smooth = fast.regularize(1e-6, kind).solve((0, 10), [1.0, 0.0], method="Rodas5P")
+    assert smooth.y[1, -1] == pytest.approx(10 / 3, abs=1e-5)
+
+
+def test_the_twin_has_the_default_parameters() -> None:
+    def fun(t: Any, x: Any, a: float = 1.0) -> list[Any]:
+        if a > 1.5:
+            return [-a * x[0] + np.sign(x[0] - 3)]
+        return [0.1 * x[0] - np.sign(x[0])]
+
+    system = fl.System(fun, n=1)
+    system.solve((0, 1), [1.0], a=2.0)
+    smooth = system.regularize(1e-3)
+    assert smooth.params == {"a": 1.0, "eps": 1e-3}
+    np.testing.assert_allclose(
+        smooth.solve((0, 0.5), [1.0]).y[0, -1], system.solve((0, 0.5), [1.0]).y[0, -1], rtol=1e-6
+    )
+
+
+def test_static_friction_has_no_smooth_twin() -> None:
+    friction = fl.Stick(lambda t, x: x[1] - 0.2, static=2.0)
+    system = fl.System(lambda t, x: [x[1], -x[0] - friction(t, x)], n=2)
+    with pytest.raises(fl.ModelError, match="static friction above kinetic has no smooth twin"):
+        system.regularize(1e-3)

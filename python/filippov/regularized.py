@@ -36,7 +36,7 @@ def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared
     InputError
         If `kind` or `kappa` is wrong.
     ModelError
-        If the system is a black box, or has resets or laws.
+        If the system is a black box, has resets, laws or static friction, or a function of many signs.
     """
     if kind not in _KINDS:
         raise InputError(f'kind: "tanh" or "linear" is needed, not {kind!r}')
@@ -56,7 +56,10 @@ def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared
             f"{', '.join(core.laws())}"
         )
     factors = _factors(kappa, prepared.surfaces)
-    twin = core.regularized(eps, factors, kind == "linear")
+    try:
+        twin = core.regularized(eps, factors, kind == "linear")
+    except ValueError as error:
+        raise ModelError(f"regularize: {error}") from None
     return Prepared(twin, None, tuple(twin.surfaces()), None, "")
 
 

@@ -410,13 +410,15 @@ class System(Points, Saving):
         InputError
             If an argument is wrong, or the system has a parameter ``"eps"``.
         ModelError
-            If the system has quantisers, resets, or laws with a memory, which are named; or if the number of
-            its states is not known, or it could not be traced.
+            If the system has quantisers, resets, or laws with a memory, which are named; static friction; a
+            function of more than three signs; or if the number of its states is not known, or it could not be
+            traced.
 
         Notes
         -----
         Every spelling of a switch means a sign: ``abs(h)`` becomes ``h tanh(u)``, and a choice between two
-        values the one with the weights ``(1 + tanh(u)) / 2`` and ``(1 - tanh(u)) / 2``. Both values are
+        values, and any other function of a sign, the mean of the two with the weights ``(1 + tanh(u)) / 2``
+        and ``(1 - tanh(u)) / 2``. So its limit is Filippov's motion, whatever the spelling. Both values are
         needed on both sides of the surface. Motions that slide are stiff, with rates like 1 / eps: for small
         `eps` take ``method="Rodas5P"``.
 
@@ -441,7 +443,7 @@ class System(Points, Saving):
         width = positive("eps", eps)
         if "eps" in self._params:
             raise InputError("eps: the system has a parameter of this name; rename it")
-        prepared = self._prepared_now()
+        prepared = self.prepare(self._known_n(), 0.0, None, self.parameter_values(None))
         twin = regularized(prepared, "eps", kind, kappa)
         params = {**self._params, "eps": width}
         if prepared.pinned is not None:

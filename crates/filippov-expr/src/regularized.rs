@@ -17,8 +17,9 @@ pub enum Ramp {
 }
 
 impl Graph {
-    /// A new graph with these values in which the sign of every surface j is a function of `kappa[j] * h_j / eps`. A select
-    /// becomes the combination of its branches with the weights (1 +- s) / 2.
+    /// A new graph with these values in which the sign of every surface j is a function of `kappa[j] * h_j / eps`. In between
+    /// the values are those of the multilinear interpolant, however they were written (see [`Graph::blended`]); `None` if they
+    /// have none that can be written out.
     ///
     /// `eps` is the parameter with this index. Only a linear ramp leaves surfaces, where it bends.
     ///
@@ -28,7 +29,7 @@ impl Graph {
     /// let mut g = Graph::new();
     /// let v = g.state(0);
     /// let sign = g.sign(v);
-    /// let (smooth, values) = g.regularized(&[sign], 0, &[2.0], Ramp::Tanh);
+    /// let (smooth, values) = g.regularized(&[sign], 0, &[2.0], Ramp::Tanh).expect("one sign is in no other one's way");
     /// assert_eq!(smooth.text(values[0], &Names::default()), "tanh(2*x[0]/p[0])");
     /// assert_eq!(smooth.n_surfaces(), 0);
     /// ```
@@ -38,7 +39,12 @@ impl Graph {
         eps: u32,
         kappa: &[f64],
         ramp: Ramp,
-    ) -> (Graph, Vec<NodeId>) {
+    ) -> Option<(Graph, Vec<NodeId>)> {
+        let all: Vec<u32> = (0..self.n_surfaces() as u32).collect();
+        let mut own = self.clone();
+        let roots = own.blended(roots, &all)?;
+        let functions: Vec<NodeId> = all.iter().map(|&j| own.surface(j)).collect();
+        let functions = own.blended(&functions, &all)?;
         let mut graph = Graph::new();
         let eps = graph.parameter(eps);
         let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
@@ -46,8 +52,8 @@ impl Graph {
         // A switching function may have a larger number than the sign that it decides.
         let mut pending = roots.to_vec();
         while let Some(&id) = pending.last() {
-            let node = *self.node(id);
-            let function = node.surface().map(|j| self.surface(j));
+            let node = *own.node(id);
+            let function = node.surface().map(|j| functions[j as usize]);
             let missing: Vec<NodeId> = node
                 .operands()
                 .chain(function)
@@ -61,15 +67,12 @@ impl Graph {
             let sign = node.surface().map(|j| {
                 *signs.entry(j).or_insert_with(|| {
                     let factor = graph.constant(kappa[j as usize]);
-                    let scaled = graph.mul(factor, image[&self.surface(j)]);
+                    let scaled = graph.mul(factor, image[&functions[j as usize]]);
                     let u = graph.div(scaled, eps);
                     graph.ramp(u, ramp)
                 })
             });
             let new = match (node, sign) {
-                (Node::Select { plus, minus, .. }, Some(sign)) => {
-                    graph.between(sign, image[&plus], image[&minus])
-                }
                 (_, Some(sign)) => sign,
                 (Node::Unary(op, a), _) => graph.unary(op, image[&a]),
                 (Node::Binary(op, a, b), _) => graph.binary(op, image[&a], image[&b]),
@@ -78,7 +81,7 @@ impl Graph {
             image.insert(id, new);
         }
         let values = roots.iter().map(|root| image[root]).collect();
-        (graph, values)
+        Some((graph, values))
     }
 
     fn ramp(&mut self, u: NodeId, ramp: Ramp) -> NodeId {

@@ -513,8 +513,15 @@ impl TracedSystem {
                 "a number per surface, and no laws, are needed",
             ));
         }
+        if !self.rules.sticking.is_empty() {
+            return Err(PyValueError::new_err(
+                "static friction above kinetic has no smooth twin",
+            ));
+        }
         let ramp = if is_linear { Ramp::Linear } else { Ramp::Tanh };
-        Self::build(self.definition().regularized(eps, &kappa, ramp))
+        let twin = self.definition().regularized(eps, &kappa, ramp);
+        let entangled = "a function contains more signs than can be smoothed together";
+        Self::build(twin.ok_or_else(|| PyValueError::new_err(entangled))?)
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {

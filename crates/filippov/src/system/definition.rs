@@ -79,19 +79,19 @@ impl Definition {
     }
 
     /// The system in which a function of `kappa[j] * h_j / eps` replaces every sign. The width `eps` becomes its last parameter.
-    /// It has no laws and no watched surfaces: the caller refuses systems that have any.
-    #[must_use]
-    pub fn regularized(&self, eps: &str, kappa: &[f64], ramp: Ramp) -> Self {
+    /// It has no laws and no watched surfaces: the caller refuses systems that have any. `None` if a function contains too many
+    /// signs to be written out.
+    pub fn regularized(&self, eps: &str, kappa: &[f64], ramp: Ramp) -> Option<Self> {
         let mut names = self.names.clone();
         let index = names.parameters.len() as u32;
         names.parameters.push(eps.to_owned());
-        let (graph, field) = self.graph.regularized(&self.field, index, kappa, ramp);
-        Definition {
+        let (graph, field) = self.graph.regularized(&self.field, index, kappa, ramp)?;
+        Some(Definition {
             graph,
             field,
             names,
             rules: Rules::default(),
-        }
+        })
     }
 
     /// How many surfaces a user sees. Those of laws come after them, and before these those that no motion crosses.
