@@ -192,3 +192,16 @@ def test_systems_without_derivatives_are_refused() -> None:
         fl.lyapunov(fl.System(lambda t, x, k=1.0: [-k * x[0]], n=1, discrete={"k": 1.0}), (0, 1), [1.0])
     with pytest.raises(fl.InputError, match="System is needed"):
         fl.lyapunov(lambda t, x: x, (0, 1), [1.0])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("section", [None, fl.Phase(1.0)])
+def test_what_is_done_at_the_start_counts(section: Any) -> None:
+    halving = fl.Reset(period=1.0, map=lambda t, x: [0.5 * x[0]])
+    system = fl.System(lambda t, x: [x[0]], n=1, resets=halving)
+    arguments: dict[str, Any] = {"section": section, "transient": 0}
+    found = fl.lyapunov(system, (0, 10), [1.0], rtol=1e-10, atol=1e-12, **arguments)
+    # Ten resets, the first at the start; that at the end comes behind it.
+    assert float(found.exponent[0]) == pytest.approx(1 - np.log(2), abs=1e-8)
+    run = system.solve((0, 10), [1.0], wrt="y0", rtol=1e-10, atol=1e-12)
+    growth = np.log(np.asarray(run.derivative())[0, 0]) / 10
+    assert growth == pytest.approx(1 - 1.1 * np.log(2), abs=1e-8)

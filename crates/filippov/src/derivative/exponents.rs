@@ -202,6 +202,15 @@ impl<'a> Exponents<'a> {
                 .codimension(record.mode[k], record.discrete[k]);
             found.min(self.n)
         });
+        if self.left.is_none() {
+            // What is done at the start comes after it.
+            let is_at_start = |mark: &mut f64| *mark <= record.t[0];
+            if let Some(mark) = self.marks.pop_if(is_at_start) {
+                self.is_counting = true;
+                self.found.t.push(mark);
+                self.found.sums.push(self.sums.clone());
+            }
+        }
         self.left.get_or_insert(self.n - before);
         let mut left = self.n - after;
         if let Some(map) = record.map {
