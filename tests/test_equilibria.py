@@ -215,3 +215,55 @@ def test_equilibria_and_their_branches_can_be_pickled() -> None:
     assert again.y == rest.y
     assert again.eigenvalues == -2.0
     assert [point.state.y for point in points] == [point.state.y for point in branch.points]
+
+
+def test_lines_of_equilibria_and_what_first_order_does_not_tell() -> None:
+    friction = fl.System(lambda t, x: [x[1], -x[0] - np.sign(x[1])], states=("x", "v"))
+    found = fl.equilibria(friction, {"x": (-2, 2), "v": (-2, 2)})
+    assert len(found) == 0
+    assert not found.certified
+    (line,) = found.lines
+    assert "EquilibriumLine(from" in repr(found)
+    np.testing.assert_allclose(np.sort(line.y[0, [0, -1]]), [-1, 1], atol=1e-8)
+    # A circle, and a centre in it.
+    circle = fl.System(
+        lambda t, x: [x[1] * (1 - x[0] ** 2 - x[1] ** 2), -x[0] * (1 - x[0] ** 2 - x[1] ** 2)], n=2
+    )
+    found = fl.equilibria(circle, [(-2, 2), (-2, 2)])
+    (line,), (centre,) = found.lines, found
+    np.testing.assert_allclose(np.hypot(*line.y), 1.0, atol=1e-10)
+    assert np.ptp(np.unwrap(np.arctan2(line.y[1], line.y[0]))) == pytest.approx(2 * np.pi, abs=1e-9)
+    assert (centre.stability, centre.is_stable) == ("neutral", False)
+    # One equilibrium of higher order is no line.
+    (flat,) = fl.equilibria(fl.System(lambda t, x: [-(x[0] ** 3), -x[1]], n=2), [(-2, 2), (-2, 2)])
+    assert flat.stability == "neutral"
+
+
+def test_an_intersection_around_which_motions_turn_is_neutral_to_first_order() -> None:
+    def genes(t: Any, x: Any) -> list[Any]:
+        return [1.8 * (x[1] < 1) - x[0] + 0.1, 1.8 * (x[0] > 1) - x[1]]
+
+    (meeting,) = fl.equilibria(fl.System(genes, n=2), [(0, 2.5), (0, 2.5)])
+    assert (meeting.codimension, meeting.stability) == (2, "neutral")
+    np.testing.assert_allclose(meeting.y, [1, 1], atol=1e-12)
+
+
+def test_what_jumps_at_known_times_has_no_equilibria() -> None:
+    kicked = fl.System(
+        lambda t, x: [x[1], -x[0]], n=2, resets=fl.Reset(period=1.0, map=lambda t, x: [x[0] + 1, x[1]])
+    )
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.5, 0.5)
+    for system, message in (
+        (kicked, "resets at known times"),
+        (fl.System(lambda t, x: [-relay(t, x), -x[1]], n=2), "laws with a memory"),
+    ):
+        with pytest.raises(fl.InputError, match=message):
+            fl.equilibria(system, [(-2, 2), (-2, 2)])
+        with pytest.raises(fl.InputError, match=message):
+            fl.equilibrium(system, [0.1, 0.1])
+    # Rest in contact is not looked for: nothing is certified.
+    bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.9 * x[1]])
+    ball = fl.System(lambda t, x: [x[1], -9.8], n=2, resets=bounce)
+    assert not fl.equilibria(ball, [(-2, 2), (-2, 2)]).certified
+    with pytest.raises(TypeError, match="it is a parameter of the system"):
+        fl.equilibria(SYSTEM, BOX, alpha=0.4)

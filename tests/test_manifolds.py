@@ -230,3 +230,12 @@ def test_wrong_sides_are_named() -> None:
         with pytest.raises(fl.InputError, match="sides: 1, -1 or both are needed"):
             fl.manifold(fl.equilibrium(duffing, [0.0, 0.0]), length=1.0, sides=sides)
     assert len(fl.manifold(fl.equilibrium(duffing, [0.0, 0.0]), length=1.0, sides=1)) == 1
+
+
+def test_a_manifold_ends_where_the_state_jumps() -> None:
+    reset = fl.Reset(lambda t, x: x[0] - 1, lambda t, x: [x[0], -0.5 * x[1]], direction="up")
+    saddle = fl.System(lambda t, x: [x[1], x[0]], n=2, resets=reset)
+    (curve,) = fl.manifold(fl.equilibrium(saddle, [0, 0]), "unstable", length=3, sides=[1])
+    np.testing.assert_allclose(curve.points[:, -1], [1, 1], atol=1e-6)
+    assert curve.length == pytest.approx(np.sqrt(2), abs=1e-6)
+    assert "the state jumps at" in curve.reason

@@ -173,14 +173,14 @@ class TestPicture:
         ((lambda t, x: [-x[0], 0.0], BOX), "a filippov.System is needed"),
         ((fl.System(lambda t, x: [1.0, 0.0, -np.sign(x[2])], n=3), BOX), "of two states, not 3"),
         ((fl.System(lambda t, x: [x[1], np.sin(t) - np.sign(x[1])], n=2), BOX), "depends on the time"),
-        ((harvest(ALPHA), [(0, 1)]), "two intervals"),
-        ((harvest(ALPHA), [(0, 1), (1, 0)]), "two intervals"),
+        ((harvest(ALPHA), [(0, 1)]), "box: ends for 2 states are needed, 1 are given"),
+        ((harvest(ALPHA), [(0, 1), (1, 0)]), "box: finite ends with lower < upper"),
     ],
 )
 def test_mistakes_are_named(arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(fl.InputError, match=message):
         phase_portrait(*arguments)
-    with pytest.raises(fl.InputError, match="duration: a positive time"):
+    with pytest.raises(fl.InputError, match="duration: a positive number"):
         phase_portrait(harvest(ALPHA), BOX, duration=-1.0, density=2)
     pytest.importorskip("matplotlib")
     with pytest.raises(ValueError, match="box: the window is needed"):
@@ -206,3 +206,71 @@ def test_wrong_starts_and_cycles_of_a_portrait_are_named() -> None:
     with pytest.raises(fl.InputError, match="cycles: each is a Cycle"):
         phase_portrait(saddle, [(-1, 1), (-1, 1)], starts=0, cycles=[3])
     assert phase_portrait(saddle, [(-1, 1), (-1, 1)], starts=[]).trajectories == []
+
+
+def test_beside_nested_branches_a_surface_has_the_fields_of_its_own_sides() -> None:
+    """The second branch is read on one side of the first alone."""
+
+    def fun(t: Any, x: Any) -> list[Any]:
+        if x[0] > 0:
+            return [-1.0, 0.2]
+        if x[1] > 0:
+            return [1.0, 1.0]
+        return [1.0, -0.2 - 3 * (x[1] + 1)]
+
+    system = fl.System(fun, n=2)
+    found = phase_portrait(system, [(-2, 2), (-2, 2)], starts=0, density=3)
+    below = [arrow for arrow in found.sliding if arrow.y[0] == 0.0 and arrow.y[1] < -0.01]
+    assert len(below) == 3
+    for arrow in below:
+        np.testing.assert_allclose(arrow.velocity[1], -1.5 * (arrow.y[1] + 1), atol=1e-9)
+    (node,) = (point for point in found.equilibria if point.stability == "stable")
+    np.testing.assert_allclose(node.y, [0, -1], atol=1e-12)
+
+    def turning(t: Any, x: Any) -> list[Any]:
+        if x[0] > 0:
+            return [-1.0, 0.2]
+        return [-x[1] - 1, 1.0] if x[1] < 0 else [1.0, 1.0]
+
+    (tangency,) = phase_portrait(fl.System(turning, n=2), [(-2, 2), (-2, 2)], starts=0, density=3).tangencies
+    assert (tangency.side, tangency.is_visible) == (-1, True)
+    np.testing.assert_allclose(tangency.y, [0, -1], atol=1e-12)
+
+
+def test_all_states_in_which_friction_sticks_are_one_line() -> None:
+    friction = fl.System(lambda t, x: [x[1], -x[0] - np.sign(x[1])], states=("x", "v"))
+    found = phase_portrait(friction, {"x": (-2, 2), "v": (-2, 2)}, starts=0, density=3)
+    assert found.equilibria == []
+    (line,) = found.lines
+    np.testing.assert_allclose(np.sort(line.y[0, [0, -1]]), [-1, 1], atol=1e-8)
+    assert np.all(line.y[1] == 0.0)
+    pytest.importorskip("matplotlib")
+    axes = fl.plot.portrait(found)
+    (drawn,) = (one for one in axes.lines if one.get_label() == "equilibria")
+    np.testing.assert_allclose(np.sort(drawn.get_xdata()[[0, -1]]), [-1, 1], atol=1e-8)
+
+
+def test_a_relay_with_a_memory_has_no_portrait() -> None:
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.5, 0.5)
+    system = fl.System(lambda t, x: [-relay(t, x), -x[1]], n=2)
+    with pytest.raises(fl.InputError, match="laws with a memory"):
+        phase_portrait(system, [(-2, 2), (-2, 2)])
+    ticking = fl.Reset(period=1.0, map=lambda t, x: [x[0] + 1, x[1]])
+    with pytest.raises(fl.InputError, match="resets at known times"):
+        phase_portrait(fl.System(lambda t, x: [x[1], -x[0]], n=2, resets=ticking), [(-2, 2), (-2, 2)])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"duration": "a"}, "duration: a positive number"),
+        ({"starts": -3}, "starts: so many starts, from 0 on"),
+        ({"events": [lambda t, x: x[0]]}, "events: they have no place here"),
+    ],
+)
+def test_wrong_options_are_named(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(fl.InputError, match=message):
+        phase_portrait(harvest(ALPHA), BOX, density=2, **options)
+    pytest.importorskip("matplotlib")
+    with pytest.raises(fl.InputError, match="manifolds: each is a ManifoldCurve"):
+        fl.plot.portrait(harvest(ALPHA), BOX, manifolds=[1])

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from filippov._core import ModeBounds, TracedSystem
-from filippov.cycles.forcing import depends_on_time
+from filippov.analysis.observe import check_keywords
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, refuse_without_equilibria, rest_of
+from filippov.cycles.rest_line import EquilibriumLine, is_singular, line_through
 from filippov.errors import InputError, ModelError
 from filippov.prepare import parameter_vector
 from filippov.progress import share_bar
@@ -24,12 +25,14 @@ from filippov.scalars import real
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Equilibria", "equilibria"]
+__all__ = ["Equilibria", "ends_of", "equilibria"]
 
 # Bounds are tried for so few states and modes, and over so many boxes.
 _MOST_STATES, _MOST_BOXES, _MOST_MODES = 4, 30_000, 2187
 # A box is not divided further below this part of the first one.
 _NARROWEST = 1e-7
+# Nor below this one, if equilibria fill a line in it.
+_NARROW = 0.05
 # Newton's method starts from so many points in each mode, fewer if there are many modes. Equilibria nearer to
 # each other than a part of the box are one.
 _STARTS, _FEWEST_STARTS, _MOST_RUNS, _SAME = 40, 4, 4000, 1e-7
@@ -46,12 +49,20 @@ class Equilibria(Sequence[Equilibrium]):
         Whether it is proved that there are no others in the box.
     unresolved : list of ndarray, shape (n, 2)
         Boxes of states for which neither was proved: that there are none in them, or exactly one.
+    lines : list of EquilibriumLine
+        Lines that equilibria fill, as the states at which dry friction holds a body; these are not among the
+        others.
     """
 
     def __init__(
-        self, found: Sequence[Equilibrium], certified: bool, unresolved: Sequence[Array] = ()
+        self,
+        found: Sequence[Equilibrium],
+        certified: bool,
+        unresolved: Sequence[Array] = (),
+        lines: Sequence[EquilibriumLine] = (),
     ) -> None:
         self._found, self.certified, self.unresolved = list(found), certified, list(unresolved)
+        self.lines = list(lines)
 
     @overload
     def __getitem__(self, key: int) -> Equilibrium: ...
@@ -68,7 +79,7 @@ class Equilibria(Sequence[Equilibrium]):
     def __repr__(self) -> str:
         words = "proved to be all" if self.certified else "there may be others"
         kind = "equilibrium" if len(self) == 1 else "equilibria"
-        return "\n".join([f"{len(self)} {kind}, {words}", *map(repr, self._found)])
+        return "\n".join([f"{len(self)} {kind}, {words}", *map(repr, [*self._found, *self.lines])])
 
 
 def equilibria(
@@ -111,13 +122,15 @@ def equilibria(
     Raises
     ------
     InputError
-        If an argument is wrong, or the system depends on the time or has laws with a memory.
+        If an argument is wrong, or the system depends on the time, or has laws with a memory, or resets at
+        known times.
 
     Notes
     -----
     An equilibrium on the border of its region, or a pseudo-equilibrium at the end of its sliding segment, may
     be in the list once, twice, or not at all. There, at folds, and where equilibria fill a line, nothing is
-    proved: `unresolved` has these places.
+    proved: `unresolved` has these places, and `lines` the lines that were found. Rest in contact with a
+    surface of resets is not looked for, and nothing is certified for systems with resets.
 
     References
     ----------
@@ -133,29 +146,32 @@ def equilibria(
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
-    low, high = _ends(box, system)
+    check_keywords(options, system, equilibria)
+    low, high = ends_of(box, system)
     motions = Motions(system, len(low), system.parameter_values(params), (), options)
+    refuse_without_equilibria(motions)
     core = motions.prepared.core
     assert isinstance(core, TracedSystem)
-    if core.n_laws:
-        raise InputError(
-            f"system: it has laws with a memory or clocks ({', '.join(core.laws())}), and its equilibria are "
-            "not those of a field"
-        )
-    if depends_on_time(motions, 1.0):
-        raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
     search = _Search(motions, core, low, high, virtual, progress)
     modes = list(_modes(search))
     is_small = len(low) <= _MOST_STATES and len(modes) <= _MOST_MODES
     found, unresolved = _by_bounds(search, modes) if is_small else ([], [search.states_of(low, high)])
+    lines: list[EquilibriumLine] = []
     if unresolved:
-        found = _merged(search, found, _by_starts(search, modes), _SAME)
+        more, lines = _by_starts(search, modes)
+        found = _merged(search, found, more, _SAME)
     found.sort(key=lambda point: (point.codimension, tuple(point.y.tolist()), tuple(point.mode)))
-    return Equilibria(found, not unresolved, unresolved)
+    return Equilibria(found, not unresolved and not motions.prepared.actions, unresolved, lines)
 
 
-def _ends(box: Any, system: System) -> tuple[Array, Array]:
-    """Return the ends of a box of states."""
+def ends_of(box: Any, system: System) -> tuple[Array, Array]:
+    """Return the ends of a box of states, lower and upper.
+
+    Raises
+    ------
+    InputError
+        If they are none.
+    """
     if isinstance(box, Mapping):
         if system.n is None:
             raise InputError("box: give n= or states= to the System to name its states")
@@ -326,13 +342,28 @@ class _Proof:
         low, high = narrowed
         relative = (high - low) / (self._high - self._low)
         k = int(np.argmax(relative))
-        if relative[k] < _NARROWEST:
+        if relative[k] < _NARROWEST or (relative[k] < _NARROW and self._is_on_line(low, high)):
             self.unresolved.append((low, high))
             return []
         middle = 0.5 * (low[k] + high[k])
         below, above = high.copy(), low.copy()
         below[k], above[k] = middle, middle
         return [(low, below), (above, high)]
+
+    def _is_on_line(self, low: Array, high: Array) -> bool:
+        """Whether a box contains a zero that is not the only one around: no part of it can be proved."""
+        w, size = 0.5 * (low + high), high - low
+        for _ in range(4):
+            values, below, above = (found[self._rows] for found in self._bounds.over(w, w, self._p))
+            if not (np.isfinite(below).all() and np.isfinite(above).all()):
+                return False
+            own = 0.5 * (below + above) * size
+            change = -np.linalg.lstsq(own, 0.5 * (values[:, 0] + values[:, 1]), rcond=1e-9)[0]
+            w = w + change * size
+            if not np.max(np.abs(change)) < 1.0:
+                return False
+        is_zero = np.max(np.abs(change)) < 1e-9 and np.all(w >= low) and np.all(w <= high)
+        return bool(is_zero) and is_singular(own / size, self._high - self._low)
 
     def _narrowed(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Return the part of a box that may have zeros that are not known; None if there is none."""
@@ -416,14 +447,18 @@ class _Proof:
                 return
 
 
-def _by_starts(search: _Search, modes: Sequence[tuple[int, ...]]) -> list[Equilibrium]:
-    """Return the equilibria that Newton's method finds from many starting points."""
+def _by_starts(
+    search: _Search, modes: Sequence[tuple[int, ...]]
+) -> tuple[list[Equilibrium], list[EquilibriumLine]]:
+    """Return the equilibria that Newton's method finds from many starting points, and lines of them."""
     random = np.random.default_rng(0)
     starts = search.low + random.uniform(size=(_STARTS, search.n)) * (search.high - search.low)
     starts[0] = 0.5 * (search.low + search.high)
     if len(modes) > _MOST_MODES:
         modes = _modes_at(search, starts)
     found: list[Equilibrium] = []
+    lines: list[EquilibriumLine] = []
+    size = search.high - search.low
     with share_bar(search.progress, "equilibria by Newton's method") as show:
         for k, mode in enumerate(modes):
             curve = EquilibriumCurve(search.motions, mode)
@@ -433,10 +468,15 @@ def _by_starts(search: _Search, modes: Sequence[tuple[int, ...]]) -> list[Equili
                     point = rest_of(curve, np.append(x, multipliers))
                 except (ModelError, np.linalg.LinAlgError):
                     continue
-                if search.wants(point):
+                if not search.wants(point) or any(line.passes(point, size) for line in lines):
+                    continue
+                line = line_through(point, size, search.wants)
+                if line is not None:
+                    lines.append(line)
+                else:
                     found = _merged(search, found, [point], _SAME)
             show((k + 1) / len(modes), f"{len(found)} found")
-    return found
+    return found, lines
 
 
 def _modes_at(search: _Search, starts: Array) -> list[tuple[int, ...]]:

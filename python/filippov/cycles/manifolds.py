@@ -286,11 +286,17 @@ def _sampled(run: Solution, which: str) -> tuple[Array, Array, str]:
                     "trajectories from there are not unique"
                 )
                 break
+    else:
+        jump = next((one for one in run.switches if np.any(one.y_before != one.y_after)), None)
+        if jump is not None:
+            end, reason = float(jump.t), f"the state jumps at {_numbers(jump.y_before)}"
     ticks = np.union1d(run.t[run.t < end], [end])
     share = np.arange(_PER_STEP) / _PER_STEP
     times = np.append((ticks[:-1, None] + np.diff(ticks)[:, None] * share).ravel(), end)
     assert run.sol is not None
-    return times, run.sol(times), reason
+    points = run.sol(times)
+    points[:, -1] = run.sol(end, "left")
+    return times, points, reason
 
 
 def _at_length(run: Solution, start: Array, between: tuple[float, float], length: float) -> Array:

@@ -11,16 +11,17 @@ import numpy.typing as npt
 
 from filippov.analysis.observe import check_keywords
 from filippov.arrays import finite_array
+from filippov.cycles.box import ends_of, equilibria
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.rest import Equilibrium, EquilibriumCurve, first_multipliers, rest_of
+from filippov.cycles.rest import Equilibrium, refuse_without_equilibria
+from filippov.cycles.rest_line import EquilibriumLine
 from filippov.cycles.streamlines import Streamline, streamlines
 from filippov.errors import FilippovError, InputError, ModelError
 from filippov.events import Event
 from filippov.modes import Mode
 from filippov.prepare import parameter_vector
-from filippov.scalars import count
+from filippov.scalars import count, positive
 from filippov.sheets import SurfaceParts, surface_parts
 from filippov.sliding import sliding_field
 from filippov.solution import Solution
@@ -28,9 +29,9 @@ from filippov.system import System
 
 __all__ = ["Portrait", "SlidingArrow", "TangencyPoint", "phase_portrait"]
 
-# Starts of Newton's method in each direction, along each surface, and in each direction for two surfaces.
-_STARTS, _STARTS_ALONG, _STARTS_OF_PAIRS = 9, 25, 3
-# Two equilibria or tangencies nearer than this share of the window are one.
+# Speeds are looked at in so many places in each direction.
+_PLACES = 9
+# Two tangencies nearer than a thousand times this share of the window are one.
 _SAME = 1e-6
 # How far trajectories are followed: so many times the time to cross the window.
 _CROSSINGS = 12.0
@@ -95,6 +96,8 @@ class Portrait(NamedTuple):
         Those of the system in the window, pseudo-equilibria too.
     trajectories : list of Solution
     cycles : list of Cycle
+    lines : list of EquilibriumLine
+        Lines that equilibria fill.
     """
 
     system: System
@@ -108,11 +111,12 @@ class Portrait(NamedTuple):
     equilibria: list[Equilibrium]
     trajectories: list[Solution]
     cycles: list[Cycle]
+    lines: list[EquilibriumLine]
 
 
 def phase_portrait(
     system: System,
-    box: Sequence[tuple[float, float]],
+    box: Sequence[tuple[float, float]] | Mapping[str, tuple[float, float]],
     params: Mapping[str, float] | None = None,
     *,
     starts: npt.ArrayLike | int = _TRAJECTORIES,
@@ -128,8 +132,8 @@ def phase_portrait(
     ----------
     system : System
         A traced system of two states that does not depend on the time.
-    box : sequence of (float, float)
-        The window: one interval for each state.
+    box : sequence of (float, float), or dict
+        The window: one interval for each state, in their order or by their names.
     params : dict, optional
         Values of parameters; the others have their defaults.
     starts : array_like of shape (k, 2), or int, optional
@@ -153,12 +157,12 @@ def phase_portrait(
     Raises
     ------
     InputError
-        If an argument is wrong, or the system has not two states, or depends on the time.
+        If an argument is wrong, or the system has not two states, depends on the time, or has laws with a
+        memory.
 
     Notes
     -----
-    Equilibria are found by Newton's method from many starts, and tangencies between points of a grid. That is
-    a heuristic, which may miss some.
+    Equilibria are those of `equilibria`. Tangencies are found between points of a grid, which may miss some.
 
     Examples
     --------
@@ -169,24 +173,26 @@ def phase_portrait(
     >>> [(point.side, point.is_visible, point.y.round(9).tolist()) for point in found.tangencies]
     [(1, False, [-1.0, 0.5]), (-1, True, [1.0, 0.5])]
     >>> found.equilibria
-    [Equilibrium(unstable equilibrium at (1, 0), mode -, eigenvalues (0+1j, 0-1j))]
+    [Equilibrium(neutral equilibrium at (1, 0), mode -, eigenvalues (0+1j, 0-1j))]
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
     check_keywords(options, system, phase_portrait)
     if system.n not in (None, 2):
         raise InputError(f"system: a portrait is of two states, not {system.n}")
-    window = finite_array([list(pair) for pair in box], "box")
-    if window.shape != (2, 2) or not (window[:, 0] < window[:, 1]).all():
-        raise InputError("box: two intervals (low, high) with low < high are needed, one for each state")
+    if "events" in options:
+        raise InputError("events: they have no place here; trajectories end a little outside of the window")
+    window = np.column_stack(ends_of(box, system))
+    if len(window) != 2:
+        raise InputError(f"box: two intervals (low, high) are needed, one for each state, not {len(window)}")
     if not all(isinstance(cycle, Cycle) for cycle in cycles):
         raise InputError("cycles: each is a Cycle, as of fl.limit_cycle")
     motions = Motions(system, 2, system.parameter_values(params), (), {})
-    if depends_on_time(motions, 1.0):
-        raise InputError("system: it depends on the time; a portrait is of one that does not")
+    refuse_without_equilibria(motions)
     plane = _Plane(motions, window)
-    lines = streamlines(plane.field, plane.signs_at, window, count("density", density))
+    lines = streamlines(plane.field, plane.mode_at, window, count("density", density))
     sheets = plane.surfaces(count("points", points))
+    rest = equilibria(system, window, params)
     return Portrait(
         system,
         motions.params,
@@ -196,9 +202,10 @@ def phase_portrait(
         sheets,
         plane.sliding(sheets),
         plane.tangencies(sheets),
-        plane.equilibria(sheets),
+        list(rest),
         plane.trajectories(starts, duration, options),
         list(cycles),
+        rest.lines,
     )
 
 
@@ -222,11 +229,19 @@ class _Plane:
         """Return the switching functions."""
         return self.prepared.core.surface_values(0.0, x, np.array(signs, dtype=np.float64), self.p)
 
-    def signs_at(self, x: Array) -> tuple[int, ...]:
-        """Return the signs of the region at a point; +1 for surfaces that have no effect there."""
+    def mode_at(self, x: Array, surface: int | None = None, entry: int = 0) -> tuple[int, ...]:
+        """Return the mode of a point, with this entry on a surface; +1 for surfaces without effect there."""
         signs = np.ones(self.m)
-        for _ in range(2):  # switching functions may contain signs of others
+        for _ in range(self.m + 1):  # switching functions may contain signs of others
+            before = signs
             signs = np.where(self.heights(x, signs.astype(int).tolist()) < 0.0, -1.0, 1.0)
+            if surface is not None:
+                signs[surface] = entry or 1
+            if np.array_equal(signs, before):
+                break
+        if surface is not None:
+            signs[surface] = entry
+        # On a surface, what has an effect on one of its sides is in the mode.
         active = np.array(self.prepared.core.active(signs), dtype=bool)
         return tuple(np.where(active, signs, 1.0).astype(int).tolist())
 
@@ -265,12 +280,6 @@ class _Plane:
                 found.append(SlidingArrow(x, velocity, kind == "attracting"))
         return found
 
-    def mode_at(self, x: Array, surface: int) -> tuple[int, ...]:
-        """Return the mode of sliding on a surface at one of its points."""
-        signs = list(self.signs_at(x))
-        signs[surface] = 0
-        return tuple(signs)
-
     def tangencies(self, sheets: Sequence[SurfaceParts]) -> list[TangencyPoint]:
         """Return the points at which the field of a side is tangent to a surface."""
         found: list[TangencyPoint] = []
@@ -293,8 +302,7 @@ class _Plane:
 
     def tangency(self, surface: int, side: int, guess: Array) -> TangencyPoint | None:
         """Return the tangency near a point that the grid found, if it is one of the field of this side."""
-        signs = list(self.signs_at(guess))
-        signs[surface] = side
+        signs = self.mode_at(guess, surface, side)
 
         def equations(x: Array) -> Array:
             return np.array([self.height(x, signs, surface), self.rate(x, signs, surface)])
@@ -334,53 +342,20 @@ class _Plane:
         d = 1e-3 / speed
         return float(_slope(lambda y: np.array([self.height(y, signs, surface)]), x, d * velocity)[0] / d)
 
-    def equilibria(self, sheets: Sequence[SurfaceParts]) -> list[Equilibrium]:
-        """Return equilibria of regions, then those of sliding, in the window."""
-        guesses: dict[tuple[int, ...], list[Array]] = {}
-        for x in self.grid(_STARTS):
-            guesses.setdefault(self.signs_at(x), []).append(x)
-        for parts, points, kind in _runs(sheets):
-            if kind in ("attracting", "repelling"):
-                for x in _spread(points, _STARTS_ALONG, self.size):
-                    guesses.setdefault(self.mode_at(x, parts.surface), []).append(x)
-        for j, k in itertools.combinations(sorted({parts.surface for parts in sheets}), 2):
-            for x in self.grid(_STARTS_OF_PAIRS):
-                signs = self.signs_at(x)
-                both = tuple(0 if surface in (j, k) else sign for surface, sign in enumerate(signs))
-                guesses.setdefault(both, []).append(x)
-        found: list[Equilibrium] = []
-        for mode, places in guesses.items():
-            curve = EquilibriumCurve(self.motions, mode)
-            for x in places:
-                rest = self.rest(curve, x)
-                if rest is not None and not any(_is_same(rest, other, self.size) for other in found):
-                    found.append(rest)
-        return found
-
-    def rest(self, curve: EquilibriumCurve, x: Array) -> Equilibrium | None:
-        """Return the equilibrium near a point, if the system has it and it is in the window."""
-        try:
-            with np.errstate(all="ignore"):
-                rest = rest_of(curve, np.append(x, first_multipliers(curve, x)))
-                return rest if self.contains(rest.y) and rest.is_admissible else None
-        except (ModelError, np.linalg.LinAlgError):
-            return None
-
     def trajectories(
         self, starts: npt.ArrayLike | int, duration: float | None, options: Mapping[str, Any]
     ) -> list[Solution]:
         """Return some runs; they end a little outside of the window."""
         if isinstance(starts, (int, np.integer)) and not isinstance(starts, bool):
+            if starts < 0:
+                raise InputError(f"starts: so many starts, from 0 on, are needed, not {starts}")
             places = self.window[:, 0] + self.size * _even(int(starts))
         else:
             given = finite_array(starts, "starts")
             places = np.atleast_2d(given) if given.size else np.zeros((0, 2))
             if places.ndim != 2 or places.shape[1] != 2:
                 raise InputError(f"starts: an array of shape (k, 2) is needed, not {places.shape}")
-        if duration is None:
-            duration = _CROSSINGS * self.crossing_time()
-        elif not (np.isfinite(duration) and duration > 0):
-            raise InputError(f"duration: a positive time is needed, not {duration!r}")
+        duration = _CROSSINGS * self.crossing_time() if duration is None else positive("duration", duration)
         middle = self.window.mean(axis=1)
         size = [float(value) for value in self.size]
 
@@ -406,7 +381,7 @@ class _Plane:
 
     def crossing_time(self) -> float:
         """Return the time that a typical motion needs to cross the window."""
-        every = (np.max(np.abs(self.field(x, self.signs_at(x))) / self.size) for x in self.grid(_STARTS))
+        every = (np.max(np.abs(self.field(x, self.mode_at(x))) / self.size) for x in self.grid(_PLACES))
         speeds = [float(speed) for speed in every if np.isfinite(speed) and speed > 0.0]
         return 1.0 / float(np.median(speeds or [1.0]))
 
@@ -447,7 +422,3 @@ def _even(number: int) -> Array:
     ratio = 1.324717957244746
     k = np.arange(1, number + 1)
     return np.mod(0.5 + np.outer(k, [1.0 / ratio, 1.0 / ratio**2]), 1.0).reshape(number, 2)
-
-
-def _is_same(one: Equilibrium, other: Equilibrium, size: Array) -> bool:
-    return one.mode == other.mode and bool(np.max(np.abs(one.y - other.y) / size) < _SAME)

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import ModeBounds, TracedSystem
+from filippov.analysis.observe import check_keywords
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
@@ -26,7 +27,14 @@ from filippov.options import check_y0
 from filippov.prepare import parameter_vector
 from filippov.system import System
 
-__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "first_multipliers", "rest_of"]
+__all__ = [
+    "Equilibrium",
+    "EquilibriumCurve",
+    "equilibrium",
+    "first_multipliers",
+    "refuse_without_equilibria",
+    "rest_of",
+]
 
 _MOST_STEPS = 50
 _TOLERANCE = 1e-13
@@ -34,6 +42,8 @@ _TOLERANCE = 1e-13
 _REGULAR = 1e8
 # A jump of the field is none below this part of its changes over the size of the states.
 _NO_JUMP = 1e-9
+# Real parts of eigenvalues below this part of the largest eigenvalue are rounding.
+_ROUNDING = 1e-12
 # By this states are measured that are zero.
 _SMALL = 1e-3
 
@@ -99,24 +109,50 @@ class Equilibrium:
 
     @cached_property
     def attracts(self) -> bool:
-        """Whether the motion comes to the surfaces from beside them; yes in a region."""
+        """Whether the motion comes to the surfaces from beside them, to first order; yes in a region."""
+        return self._most_beside < 0
+
+    @cached_property
+    def _most_beside(self) -> float:
+        """The largest real part of what leads away from its surfaces."""
         if not self._curve.sliding:
-            return True
-        return bool(np.all(np.linalg.eigvals(self._curve.normal_rates(self._w)).real < 0))
+            return -1.0
+        return _largest_real_part(np.linalg.eigvals(self._curve.normal_rates(self._w)))
 
     @property
     def is_stable(self) -> bool:
-        """Whether all eigenvalues have negative real parts, and its surfaces attract."""
-        return self.attracts and bool(np.all(self.eigenvalues.real < 0))
+        """Whether it is stable to first order: `stability` is ``"stable"``."""
+        return self.stability == "stable"
+
+    @cached_property
+    def stability(self) -> str:
+        """What is known of it to first order.
+
+        ``"stable"``: all eigenvalues have negative real parts, and its surfaces attract. ``"unstable"``: one
+        has a positive real part, or a surface repels. ``"neutral"``: neither, as for centres, lines of
+        equilibria, and meetings of surfaces that motions circle; terms of higher order decide.
+        """
+        most = [_largest_real_part(self.eigenvalues), self._most_beside]
+        if any(value > 0 for value in most):
+            return "unstable"
+        return "stable" if all(value < 0 for value in most) else "neutral"
 
     def __repr__(self) -> str:
         kind = "pseudo-equilibrium" if self.codimension else "equilibrium"
-        words = f"{'stable' if self.is_stable else 'unstable'}{'' if self.is_admissible else ', virtual'}"
+        words = f"{self.stability}{'' if self.is_admissible else ', virtual'}"
         multipliers = f", multipliers {_numbers(self.multipliers)}" if self.codimension else ""
         return (
             f"Equilibrium({words} {kind} at {_numbers(self.y)}, mode {self.mode}{multipliers}, "
             f"eigenvalues {_numbers(self.eigenvalues)})"
         )
+
+
+def _largest_real_part(eigenvalues: Any) -> float:
+    """Return the largest real part, 0 within rounding; NaN if one is not known."""
+    if len(eigenvalues) == 0:
+        return -1.0
+    most = float(np.max(eigenvalues.real))
+    return 0.0 if abs(most) <= _ROUNDING * float(np.max(np.abs(eigenvalues))) else most
 
 
 def _numbers(values: Any) -> str:
@@ -354,7 +390,7 @@ def equilibrium(
     Raises
     ------
     InputError
-        If an argument is wrong, or the system depends on the time.
+        If an argument is wrong, the system depends on the time, or has laws with a memory.
     ModelError
         If Newton's method does not converge.
 
@@ -367,14 +403,34 @@ def equilibrium(
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    check_keywords(options, system, equilibrium)
     start = check_y0(y0, states=system._states)
     motions = Motions(system, len(start), system.parameter_values(params), (), options)
-    if depends_on_time(motions, 1.0):
-        raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
+    refuse_without_equilibria(motions)
     entries = _mode_of(motions, start, mode)
     curve = EquilibriumCurve(motions, entries)
     w = np.append(start, first_multipliers(curve, start))
     return rest_of(curve, w)
+
+
+def refuse_without_equilibria(motions: Motions) -> None:
+    """Refuse a system whose motion is not that of one field for all times.
+
+    Raises
+    ------
+    InputError
+        If it has laws or clocks, or depends on the time.
+    """
+    core = motions.prepared.core
+    if isinstance(core, TracedSystem) and core.n_laws:
+        raise InputError(
+            f"system: it has laws with a memory or clocks ({', '.join(core.laws())}), and its equilibria are "
+            "not those of a field"
+        )
+    if depends_on_time(motions, 1.0):
+        raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
+    if any(action.when in ("clock", "times") for action in motions.prepared.actions):
+        raise InputError("system: it has resets at known times: it has cycles, and no equilibria")
 
 
 def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:

@@ -133,9 +133,16 @@ class Track:
         if not len(self.solution.segments):
             return Polyline(t, self.shown.kept(self.solution, slice(None)), np.zeros(len(t), dtype=np.int64))
         parts = []
+        jumps = {one.t: one.y_before for one in reversed(self.solution.switches)}
         for number, (first, last) in enumerate(np.sort(self.spans, axis=1)):
             inside = (t >= first) & (t <= last)
             values = self.shown.kept(self.solution, inside)
+            before = jumps.get(self.spans[number, 1])
+            if before is not None and inside.any() and first < last:
+                # What was kept of a jump is the state behind it, which does not belong to this piece.
+                end = np.flatnonzero(t[inside] == self.spans[number, 1])
+                for row, place in zip(values, self.shown.places, strict=True):
+                    row[end] = before[place] if isinstance(place, int) else row[end]
             parts.append(Polyline(t[inside], values, np.full(len(values.T), number, dtype=np.int64)))
         return Polyline(
             np.concatenate([part.t for part in parts]),

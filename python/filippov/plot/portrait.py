@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from filippov.errors import InputError
 from filippov.plot.pieces import Track, curves_of
 from filippov.plot.style import Theme, draw_legend, entries_of, new_axes, theme
 from filippov.plot.surface import surface
@@ -23,12 +24,12 @@ __all__ = ["portrait"]
 
 Array = npt.NDArray[np.float64]
 
-_LINE_WIDTH, _TRAJECTORY_WIDTH, _CYCLE_WIDTH = 0.7, 1.3, 2.0
+_LINE_WIDTH, _TRAJECTORY_WIDTH, _CYCLE_WIDTH, _REST_WIDTH = 0.7, 1.3, 2.0, 6.0
 
 
 def portrait(
     system: System | Portrait,
-    box: Sequence[tuple[float, float]] | None = None,
+    box: Sequence[tuple[float, float]] | dict[str, tuple[float, float]] | None = None,
     params: dict[str, float] | None = None,
     ax: Any = None,
     *,
@@ -43,15 +44,16 @@ def portrait(
     Thin lines with arrows are streamlines of the field of each region. A surface is solid and heavy where it
     attracts, dashed where it repels, and dotted where trajectories cross it; arrows on it show the direction
     of sliding. Triangles are tangencies, filled if they are visible, and point to the side of the tangent
-    field. Circles are equilibria and squares pseudo-equilibria, filled if they are stable. Coloured lines are
-    trajectories, cycles and manifolds.
+    field. Circles are equilibria and squares pseudo-equilibria, filled if they are stable, half if they are
+    neutral (see `Equilibrium.stability`). Lines of equilibria are broad. Coloured lines are trajectories,
+    cycles and manifolds.
 
     Parameters
     ----------
     system : System or Portrait
         A system, or what `filippov.cycles.portrait.phase_portrait` found.
-    box : sequence of (float, float)
-        The window: one interval for each state.
+    box : sequence of (float, float), or dict
+        The window: one interval for each state, in their order or by their names.
     params : dict, optional
         Values of parameters; the others have their defaults.
     ax : matplotlib.axes.Axes, optional
@@ -76,7 +78,8 @@ def portrait(
     ImportError
         If Matplotlib is not installed.
     InputError
-        If an argument is wrong, or the system has not two states, or depends on the time.
+        If an argument is wrong, or the system has not two states, depends on the time, or has laws with a
+        memory.
 
     Examples
     --------
@@ -84,8 +87,11 @@ def portrait(
     >>> friction = fl.System(lambda t, x: [x[1], -x[0] - np.sign(x[1] - 0.5)], n=2)
     >>> axes = fl.plot.portrait(friction, [(-2, 2), (-2, 2)])  # doctest: +SKIP
     """
+    from filippov.cycles.manifolds import ManifoldCurve
     from filippov.cycles.portrait import Portrait, phase_portrait
 
+    if not all(isinstance(curve, ManifoldCurve) for curve in manifolds):
+        raise InputError("manifolds: each is a ManifoldCurve, as of fl.manifold")
     if isinstance(system, Portrait):
         if box is not None or params is not None or options:
             raise ValueError("system: a portrait that was found already takes no box, params and options")
@@ -106,6 +112,8 @@ def portrait(
     _draw_trajectories(ax, runs, chosen.colours[5], _CYCLE_WIDTH, "cycle", 2.2)
     for curve in manifolds:
         ax.plot(*curve.points, color=chosen.colours[3], linewidth=1.5, zorder=2.1, label="manifold")
+    for rest in found.lines:
+        ax.plot(*rest.y, color=chosen.ink, linewidth=_REST_WIDTH, alpha=0.45, zorder=2.45, label="equilibria")
     _draw_sliding(ax, found, chosen)
     handles = _draw_tangencies(ax, found, chosen)
     handles += _draw_equilibria(ax, found, chosen)
@@ -217,11 +225,11 @@ def _draw_tangencies(ax: Any, found: Portrait, chosen: Theme) -> list[Any]:
 def _draw_equilibria(ax: Any, found: Portrait, chosen: Theme) -> list[Any]:
     handles = []
     for is_pseudo, marker, name in ((False, "o", "equilibrium"), (True, "s", "pseudo-equilibrium")):
-        for is_stable in (True, False):
+        for stability, fill in (("stable", "full"), ("neutral", "left"), ("unstable", "none")):
             places = [
                 point.y
                 for point in found.equilibria
-                if (bool(point.codimension), point.is_stable) == (is_pseudo, is_stable)
+                if (bool(point.codimension), point.stability) == (is_pseudo, stability)
             ]
             if places:
                 (marks,) = ax.plot(
@@ -229,10 +237,12 @@ def _draw_equilibria(ax: Any, found: Portrait, chosen: Theme) -> list[Any]:
                     marker=marker,
                     linestyle="none",
                     color=chosen.ink,
-                    markerfacecolor=chosen.ink if is_stable else chosen.ground,
+                    fillstyle=fill if fill == "left" else "full",
+                    markerfacecolor=chosen.ground if fill == "none" else chosen.ink,
+                    markerfacecoloralt=chosen.ground,
                     markeredgewidth=1.3,
                     markersize=6.5,
-                    label=f"{'stable' if is_stable else 'unstable'} {name}",
+                    label=f"{stability} {name}",
                     clip_on=False,
                     zorder=3.5,
                 )
@@ -243,7 +253,7 @@ def _draw_equilibria(ax: Any, found: Portrait, chosen: Theme) -> list[Any]:
 def _named(ax: Any, handles: Sequence[Any]) -> list[Any]:
     """Return the entries of the legend: those of surfaces and lines, then of the signs, each once."""
     found = entries_of(ax)
-    for label in ("trajectory", "cycle", "manifold"):
+    for label in ("trajectory", "cycle", "manifold", "equilibria"):
         found += [line for line in ax.lines if line.get_label() == label][:1]
     texts = {handle.get_label() for handle in found}
     for handle in handles:
