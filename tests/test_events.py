@@ -325,3 +325,11 @@ def test_the_relative_speed_of_a_contact_has_no_zeros_while_it_lasts(method: str
     # One at the top of each flight, and no other: two between impacts at most.
     assert 10 < len(sol.t_events[0]) < 20
     assert sol.t_events[0][-1] < sol.switches[-1].t + 1e-6
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
+@pytest.mark.parametrize("scale", [1.0, 1e-9, 1e-14])
+def test_a_small_event_on_a_curved_surface_is_not_taken_for_zero(scale: float, method: str) -> None:
+    event = lambda t, x: scale * x[0]  # noqa: E731
+    sol = fl.solve_ivp(CIRCLE, (0, 20), [1.0, 0.0], events=event, method=method, rtol=1e-3)
+    np.testing.assert_allclose(sol.t_events[0], (np.arange(6) + 0.5) * np.pi, atol=5e-3)

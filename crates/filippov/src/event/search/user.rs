@@ -194,8 +194,9 @@ impl StepSearch<'_, '_> {
         let held = self.piece_held(function);
         let is_on_surfaces = held.is_none() && self.run.motion.mode.codimension() > 0;
         if is_on_surfaces && self.stays_zero(function, theta)? {
-            if !start.is_known_zero {
-                add(0.0, start.before);
+            let before = events.sides[index];
+            if !start.is_known_zero && before != 0.0 {
+                add(0.0, before);
             }
             events.at_end.borrow_mut()[index] = AtEnd {
                 side: 0.0,

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use filippov_expr::{Enclosure, Interval, Motion};
 use smallvec::{smallvec, SmallVec};
 
 use super::StepSearch;
@@ -104,6 +105,25 @@ fn affine_series(
         powers_of_nested(&mut series[..n_terms]);
     }
     Some(n_terms)
+}
+
+/// A place of a motion, known up to rounding.
+struct Rounded<'p> {
+    t: f64,
+    x: &'p [f64],
+}
+
+impl Motion for Rounded<'_> {
+    fn time(&self) -> Interval {
+        Interval::around(self.t, EPS * self.t.abs())
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        Enclosure {
+            value: Interval::around(self.x[index], ROUNDING * self.x[index].abs()),
+            ..Enclosure::UNKNOWN
+        }
+    }
 }
 
 /// What a series tells of a piece of a step: the sign behind its start, and the zeros.
@@ -298,10 +318,10 @@ impl StepSearch<'_, '_> {
             }
             let setting = Setting::new(&signs, &motion.discrete);
             let value = parts.value(parts.n_inner(), &setting.at(t, &y));
-            let tube = Tube::new(interpolant, (at, at), &self.detector.margin);
-            let bound = parts.enclose(parts.n_inner(), &tube, setting).value;
+            let bound = parts.enclose(parts.n_inner(), &Rounded { t, x: &y }, setting);
+            let width = bound.value.hi - bound.value.lo;
             // A value that does not exist is no zero.
-            let is_zero = value.abs() <= bound.hi - bound.lo;
+            let is_zero = width.is_finite() && value.abs() <= width;
             if !is_zero {
                 return Ok(false);
             }
