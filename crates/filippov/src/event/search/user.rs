@@ -16,7 +16,7 @@ use crate::motion::Piece;
 use crate::page::IS_PAGE;
 use crate::stepper::Interpolant;
 use crate::tolerances::{
-    MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
+    AT_SIDE, MOST_SAMPLES, MOST_ZEROS, NEAR_KINK, PIECES_OF_SERIES, ROUNDING, SHARES_BEFORE_KINK,
     SHARES_BEHIND_ZERO,
 };
 
@@ -193,7 +193,9 @@ impl StepSearch<'_, '_> {
         };
         let held = self.piece_held(function);
         let is_on_surfaces = held.is_none() && self.run.motion.mode.codimension() > 0;
-        if is_on_surfaces && self.stays_zero(function, theta)? {
+        let is_small = left.abs() <= AT_SIDE * events.before[index].abs();
+        let may_stay = start.is_known_zero || is_small || events.before[index].is_nan();
+        if is_on_surfaces && may_stay && self.stays_zero(function, theta)? {
             let before = events.sides[index];
             if !start.is_known_zero && before != 0.0 {
                 add(0.0, before);
