@@ -90,8 +90,8 @@ impl SharedLoads {
         self.loops.iter().map(|contacts| &contacts.surfaces[..])
     }
 
-    /// Multipliers with N s = -nu, 0 for those that act on no rate, the rates being `rates` at the signs `here`; `None` if there are none, or if too many
-    /// contacts share one load.
+    /// Multipliers with N s = -nu, 0 for those that act on no rate, the rates being `rates` at the signs `here`; `None` if there
+    /// are none, or if too many contacts share one load.
     pub fn at(&mut self, rates: &[f64], here: &[f64]) -> Option<SharedLoad> {
         let (mut signs, mut reserves) = (here.to_vec(), vec![None; rates.len()]);
         let nu: Vec<f64> = (0..rates.len())
