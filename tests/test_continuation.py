@@ -866,7 +866,7 @@ def test_a_curve_of_hopf_points_ends_where_they_end() -> None:
     curve = fl.continuation(hopf, ("b1", "b2"), ranges)
     assert all(abs(p.params["b1"] + p.params["b2"] ** 2) < 1e-9 for p in curve.points)
     assert max(p.params["b2"] for p in curve.points) < 1e-9
-    assert "fold, on a curve of HB" in curve.reason
+    assert "Bogdanov-Takens" in curve.reason
     for wrong in ({"store": "curve.json"}, {"detect": ["LP"]}, {"switch": "stop"}, {"monitor": {"m": 1}}):
         with pytest.raises(fl.InputError, match="a curve in two parameters has none"):
             fl.continuation(hopf, ("b1", "b2"), ranges, **wrong)

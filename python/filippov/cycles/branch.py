@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from filippov.analysis.optional import need
+from filippov.cycles.codimension_two import CODIMENSION_TWO
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.rest import Equilibrium
 from filippov.errors import InputError
@@ -32,7 +33,7 @@ CODES = {
     "GR": "grazing of a reset",
     "CO": "corner: two boundaries at once",
     "TF": "two-fold",
-    "CP": "degenerate point",
+    **CODIMENSION_TWO,
     "UZ": "a monitor vanishes",
     "EP": "end",
 }

@@ -7,18 +7,19 @@ chapter 8.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.codimension_two import CODIMENSION_TWO, ENDS, POLES
+from filippov.cycles.conditions import PROBES, Condition, condition_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.following import AnyCurve, bounds_of, curve_of
 from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
-from filippov.cycles.probes import PLACES, local_probe, probes_of
-from filippov.cycles.rest import differences
+from filippov.cycles.probes import PLACES, probes_of
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
@@ -26,95 +27,9 @@ from filippov.scalars import positive
 
 __all__ = ["OnCurve", "curve_in_two"]
 
+# Places on a curve that are one, in scaled unknowns.
+_SAME_PLACE = 1e-7
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.04, 1e-6
-_PROBES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF")
-
-
-class _Condition(Protocol):
-    """What holds at a special point."""
-
-    def value(self, w: Array) -> float:
-        """Return what vanishes."""
-
-    def gradient(self, w: Array) -> Array:
-        """Return its derivatives by all unknowns."""
-
-    def next_value(self, w: Array) -> float:
-        """Return what must not vanish as well: there the condition is degenerate."""
-
-    def keep(self, w: Array) -> None:
-        """Take a point of the curve as that near which the next one is."""
-
-
-class _ProbeCondition:
-    """A test function of an itinerary vanishes."""
-
-    def __init__(self, curve: CycleCurve, key: tuple[Any, ...], w: Array) -> None:
-        self.curve, self.key = curve, key
-        place, n = self._place(w), curve.shooting.n
-        probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
-        at = next((probe.t for probe in probes if probe.key == key), place[n] + place[n + 1])
-        self._share = (at - place[n]) / place[n + 1]
-
-    def _local(self, v: Array) -> tuple[float, float, float]:
-        """Return the test function, its next derivative, and its place as a fraction of the leg.
-
-        `v` has the start of the leg, its duration and the parameters.
-        """
-        n = self.curve.shooting.n
-        self.curve.shooting.motions.move(v[n + 2 :])
-        return local_probe(self.curve.shooting, self.key, v[:n], float(v[n]), float(v[n + 1]), self._share)
-
-    def keep(self, w: Array) -> None:
-        self._share = self._local(self._place(w))[2]
-
-    def _place(self, w: Array) -> Array:
-        shooting, leg = self.curve.shooting, self.key[1]
-        starts, durations, t0 = shooting.parts(w[: self.curve.n_unknowns])
-        t = t0 + sum(durations[:leg])
-        return np.concatenate([starts[leg], [t, durations[leg]], w[self.curve.n_unknowns :]])
-
-    def value(self, w: Array) -> float:
-        return self._local(self._place(w))[0]
-
-    def next_value(self, w: Array) -> float:
-        return self._local(self._place(w))[1]
-
-    def gradient(self, w: Array) -> Array:
-        place = self._place(w)
-        shooting, leg = self.curve.shooting, self.key[1]
-        n, m = shooting.n, shooting.m
-        scale = self.curve.scales(w)
-        period = scale[m * n]
-        own = np.concatenate([scale[leg * n : (leg + 1) * n], [period, period], self.curve.sizes])
-        slopes = differences(lambda v: np.array([self._local(v)[0]]), place, own)[0]
-        found = np.zeros(len(w))
-        found[leg * n : (leg + 1) * n] = slopes[:n]
-        found[m * n : m * n + leg] = slopes[n]
-        if shooting.is_free_in_time:
-            found[m * (n + 1)] = slopes[n]
-        found[m * n + leg] += slopes[n + 1]
-        found[self.curve.n_unknowns :] = slopes[n + 2 :]
-        return found
-
-
-class _SpectralCondition:
-    """An eigenvalue or a multiplier is critical, or an equilibrium lies on the boundary of its mode."""
-
-    def __init__(self, curve: AnyCurve, special: Special) -> None:
-        self.curve, self.key = curve, special.test
-
-    def value(self, w: Array) -> float:
-        return singular_values_of(self.curve, w)[self.key]
-
-    def gradient(self, w: Array) -> Array:
-        return np.asarray(differences(lambda v: np.array([self.value(v)]), w, self.curve.scales(w))[0])
-
-    def next_value(self, w: Array) -> float:
-        return np.nan
-
-    def keep(self, w: Array) -> None:
-        pass
 
 
 class _Extended:
@@ -122,7 +37,7 @@ class _Extended:
 
     is_exact = False
 
-    def __init__(self, curve: AnyCurve, condition: _Condition) -> None:
+    def __init__(self, curve: AnyCurve, condition: Condition) -> None:
         self.curve, self.condition = curve, condition
 
     def equations(self, w: Array, may_be_last: bool = False) -> tuple[Array, Array]:
@@ -189,13 +104,6 @@ def curve_in_two(
     return Branch(points, special, reasons, names, at_value=OnCurve(start, names, sizes))
 
 
-def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
-    if start.code in _PROBES:
-        assert isinstance(curve, CycleCurve)
-        return _Extended(curve, _ProbeCondition(curve, start.test, w))
-    return _Extended(curve, _SpectralCondition(curve, start))
-
-
 class OnCurve:
     """The points of the curve of a special point, by the value of one of both parameters.
 
@@ -214,7 +122,7 @@ class OnCurve:
     def __call__(self, near: State, name: str, value: float) -> State:
         """Return the point at a value of a parameter, near another one."""
         curve, w = curve_of(near, self.names, self.sizes)
-        extended = _extended(curve, self.start, w)
+        extended = _Extended(curve, condition_of(curve, self.start, w))
         place = len(w) - 2 + self.names.index(name)
         unit = np.zeros(len(w))
         unit[place] = 1.0
@@ -239,7 +147,7 @@ class _CurveSide:
         self.names, self.ranges, self.sizes, self.code = names, ranges, sizes, start.code
         self.own = start.test
         curve, w = curve_of(start.state, names, sizes)
-        self.extended = _extended(curve, start, w)
+        self.extended = _Extended(curve, condition_of(curve, start, w))
         scale = curve.scales(w)
         # The start is corrected at right angles to the curve.
         tangent = tangent_of(self.extended.equations(w)[1], scale)
@@ -254,29 +162,33 @@ class _CurveSide:
         self.reason = ""
         self.trail: list[tuple[Array, dict[Any, float]]] = []
         # Symmetric cycles meet their condition in several places.
-        alike = self._tests(self.w, ())
+        alike = self._tests(point, ())
         self.together = {key for key, value in alike.items() if abs(value) < 1e-7}
         self._keep(point)
 
-    def _tests(self, w: Array, without: Collection[Any] | None = None) -> dict[Any, float]:
+    def _tests(self, point: Step, without: Collection[Any] | None = None) -> dict[Any, float]:
         """Return what must not vanish along the curve."""
         without = self.together if without is None else without
-        condition, curve = self.extended.condition, self.extended.curve
-        found: dict[Any, float] = {("degenerate",): condition.next_value(w)}
+        w, condition, curve = point.w, self.extended.condition, self.extended.curve
+        tangent = tangent_of(point.jacobian, curve.scales(w), self.tangent)
+        found: dict[Any, float] = {}
         if isinstance(curve, CycleCurve):
             probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
             found.update({p.key: p.value for p in probes})
-        if self.code != "GR":  # at an impact without speed the multipliers are infinite
-            found.update(singular_values_of(curve, w))
+            if (
+                self.code in PROBES and self.code != "GR"
+            ):  # at an impact without speed the multipliers are infinite
+                found.update(singular_values_of(curve, w))
+        found.update(condition.beside(point, tangent))
         return {
             key: value
             for key, value in found.items()
             if key != self.own and key not in without and np.isfinite(value)
         }
 
-    def _keep(self, point: Step) -> None:
-        self.extended.condition.keep(self.w)
-        self.tests = self._tests(self.w)
+    def _keep(self, point: Step, tests: dict[Any, float] | None = None) -> None:
+        self.extended.condition.keep(point)
+        self.tests = self._tests(point) if tests is None else tests
         self.trail.append((self.w, self.tests))
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
         state = self.extended.curve.state(self.w, point.error)
@@ -289,7 +201,8 @@ class _CurveSide:
         while len(self.points) < most:
             try:
                 point, tangent = self._step(ds)
-                tests = self._tests(point.w)
+                # What is zero within rounding keeps its sign.
+                tests = {key: value or self.tests.get(key, 0.0) for key, value in self._tests(point).items()}
                 lost = [key for key in tests if key in self.tests and tests[key] * self.tests[key] < 0]
                 if lost and not self._pass(lost, point, tests):
                     return
@@ -301,7 +214,7 @@ class _CurveSide:
                     return
                 continue
             self.w, self.tangent = point.w, tangent
-            self._keep(point)
+            self._keep(point, tests)
             for name, value, (low, high) in zip(self.names, self.w[-2:], self.ranges, strict=True):
                 if not low < value < high:
                     self.reason = f"{name} = {value:g} is the end of its range"
@@ -317,10 +230,9 @@ class _CurveSide:
         (_, key, w), others = near[0], near[1:]
         also = {CODES[other[0]] for _, other, _ in others if other[0] in CODES and other[0] != key[0]}
         kind = " and ".join([_kind(key, self.code), *sorted(also)])
-        code = "CP" if key == ("degenerate",) else key[0]
         params = dict(zip(self.names, map(float, w[-2:]), strict=True))
         state = self.points[-1].state
-        self.special.append(Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key))
+        self.special.append(Special(key[0], kind, "", np.nan, params, len(self.points) - 1, state, key))
         self.reason = f"the flow follows the curve no further than {self._where(w)}: {kind}"
         return True
 
@@ -329,7 +241,7 @@ class _CurveSide:
         scale = self.extended.scales(self.w)
         found = []
         for key in self.tests:
-            if key[0] not in (*_PROBES, "degenerate", "LP", "PD"):
+            if key[0] not in (*PROBES, "LP", "PD") and not self._is_degenerate(key):
                 continue
             trail = [(w, tests[key]) for w, tests in self.trail if key in tests]
             w = _zero_ahead(trail)
@@ -363,18 +275,18 @@ class _CurveSide:
     def _pass(self, lost: list[Any], point: Step, tests: dict[Any, float]) -> bool:
         """Locate points at which more vanishes; whether the curve goes on behind them."""
         found = sorted((self._located(key, point, tests) for key in lost), key=lambda located: located[0])
-        for _, key, there in found:
-            is_degenerate = key[0] == "degenerate"
-            code, kind = "CP" if is_degenerate else key[0], _kind(key, self.code)
+        places = {key[0]: s for s, key, _ in found}
+        for s, key, there in found:
+            if any(abs(places.get(pole, np.inf) - s) < _SAME_PLACE for pole in POLES.get(key[0], ())):
+                continue
+            code, kind = key[0], _kind(key, self.code)
             params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
             state = self.extended.curve.state(there.w, there.error)
             special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
-            if not is_degenerate and code not in _PROBES and not _is_unit(code, state):
+            if not _is_unit(code, state) or not self.extended.condition.is_genuine(code, there.w):
                 continue
             self.special.append(special)
-            # Behind a point of Bogdanov and Takens both eigenvalues are real.
-            is_neutral = self.code == "HB" and not _is_unit("HB", self.extended.curve.state(point.w, 0.0))
-            if is_degenerate or code in _PROBES or is_neutral:
+            if self._is_degenerate(key) or code in PROBES or (self.code, code) in ENDS:
                 self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
                 self.w = there.w
                 self._keep(there)
@@ -392,10 +304,7 @@ class _CurveSide:
             return corrected(self.extended, guess, scale, self.tangent, level + s)
 
         def value(s: float) -> float:
-            w = there(s).w
-            if key[0] == "degenerate":
-                return self.extended.condition.next_value(w)
-            found = self._tests(w)
+            found = self._tests(there(s))
             if key not in found:
                 raise ModelError(f"the test function of {key[0]} is lost on the way")
             return found[key]
@@ -403,14 +312,20 @@ class _CurveSide:
         s = zero_between(value, (0.0, self.tests[key]), (length, tests[key]), 1e-12)
         return s, key, there(s)
 
+    def _is_degenerate(self, key: Any) -> bool:
+        """Whether a test function is the next derivative of that of the curve."""
+        return key[0] == "CP" and self.code in PROBES
+
     def _where(self, w: Array) -> str:
         return ", ".join(f"{name} = {value:.10g}" for name, value in zip(self.names, w[-2:], strict=True))
 
 
 def _kind(key: Any, code: str) -> str:
     """Return what a test function that vanishes on a curve means, in words."""
-    if key == ("degenerate",):
-        return f"{CODES['CP']} of {code}"
+    if key[0] == "CP" and code in PROBES:
+        return f"degenerate point of {code}"
+    if key[0] in CODIMENSION_TWO:
+        return CODIMENSION_TWO[key[0]]
     return f"{CODES[key[0]]}, on a curve of {code}"
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from filippov.cycles.arclength import Place
+from filippov.cycles.codimension_two import Spectrum
 from filippov.cycles.cycle import multipliers_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.motions import Array
@@ -17,7 +18,7 @@ from filippov.cycles.probes import PLACES, probes_of
 from filippov.cycles.rest import EquilibriumCurve
 from filippov.cycles.shooting import Shot
 
-__all__ = ["singular_values_of", "tests_at"]
+__all__ = ["boundaries_of", "singular_values_of", "spectrum_of", "tests_at"]
 
 
 def tests_at(curve: CycleCurve | EquilibriumCurve, place: Place, jacobian: Array) -> dict[Any, float]:
@@ -47,14 +48,44 @@ def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[A
     return _of_equilibrium(curve, w)
 
 
-def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
+def spectrum_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> Spectrum | None:
+    """Return the eigenvalues, or the multipliers without the trivial one; none where they are infinite."""
+    if isinstance(curve, CycleCurve):
+        return _nontrivial(curve, curve.shot(w))
+    try:
+        return np.linalg.eigvals(curve.linearisation(w)).astype(np.complex128)
+    except np.linalg.LinAlgError:  # no motion on its surfaces, or no derivatives
+        return None
+
+
+def boundaries_of(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
+    """Return the functions that are positive where an equilibrium is admissible."""
+    found: dict[Any, float] = {}
+    for j, value in zip(curve.surfaces_beside(), curve.switching(w), strict=True):
+        found["BE", j, 0] = float(value)
+    for place, j in enumerate(curve.sliding):
+        multiplier = w[curve.n + place]
+        found["BE", j, 1], found["BE", j, -1] = float(1.0 - multiplier), float(1.0 + multiplier)
+    return found
+
+
+def _nontrivial(curve: CycleCurve, shot: Shot) -> Spectrum | None:
     values = multipliers_of(shot, curve.shooting.period is not None)
     if not np.all(np.isfinite(values)):  # an impact without speed
-        return {}
-    found: dict[Any, float] = {("PD",): float(np.prod(1.0 + values).real)}
+        return None
     if curve.shooting.period is None:
         values = np.delete(values, int(np.argmin(np.abs(values - 1.0))))
-    found["LP",] = float(np.prod(1.0 - values).real)
+    return values
+
+
+def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
+    values = _nontrivial(curve, shot)
+    if values is None:
+        return {}
+    found: dict[Any, float] = {
+        ("PD",): float(np.prod(1.0 + values).real),
+        ("LP",): float(np.prod(1.0 - values).real),
+    }
     pairs = [values[i] * values[j] for i in range(len(values)) for j in range(i)]
     if pairs:
         found["NS",] = float(np.prod(1.0 - np.array(pairs)).real)
@@ -62,15 +93,9 @@ def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
 
 
 def _of_equilibrium(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
-    found: dict[Any, float] = {}
-    for j, value in zip(curve.surfaces_beside(), curve.switching(w), strict=True):
-        found["BE", j, 0] = float(value)
-    for place, j in enumerate(curve.sliding):
-        multiplier = w[curve.n + place]
-        found["BE", j, 1], found["BE", j, -1] = float(1.0 - multiplier), float(1.0 + multiplier)
-    try:
-        values = np.linalg.eigvals(curve.linearisation(w))
-    except np.linalg.LinAlgError:  # no motion on its surfaces, or no derivatives
+    found = boundaries_of(curve, w)
+    values = spectrum_of(curve, w)
+    if values is None:
         return found
     found["PSN" if curve.sliding else "LP",] = float(np.prod(values).real)
     pairs = [values[i] + values[j] for i in range(len(values)) for j in range(i)]

@@ -200,6 +200,10 @@ class Shooting:
         self._reference = u[: self.n].copy()
         self._along = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
 
+    def plane(self) -> Array | None:
+        """Return the normal of the plane in which a cycle starts that starts at no event."""
+        return None if self.period is not None or self.legs[-1].ending is not None else self._along
+
     @property
     def size(self) -> int:
         """The number of unknowns."""
@@ -252,10 +256,10 @@ class Shooting:
             jacobian[-1, m * n : m * (n + 1)] = 1.0
             if self.motions.by:
                 jacobian[-1, size:] = -self.period.slopes(self.motions)
-        elif self.legs[-1].ending is None:
-            residual[-1] = self._along @ (starts[0] - self._reference)
+        elif (normal := self.plane()) is not None:
+            residual[-1] = normal @ (starts[0] - self._reference)
             jacobian[-1] = 0.0
-            jacobian[-1, :n] = self._along
+            jacobian[-1, :n] = normal
         return Shot(found)
 
     def passage(self, i: int, t0: float, x: Array, duration: float) -> Passage:
