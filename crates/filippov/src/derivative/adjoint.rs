@@ -495,11 +495,8 @@ impl<'w> Walk<'w> {
 
     /// Notes down where terms of a surface count, if this instant is brought about by one.
     fn note_points(&mut self, record: &InstantRecord) {
-        for (term, t, x) in self
-            .at_surface(record)
-            .map(|term| (term, record.t[0], record.x[0]))
-        {
-            let x = x.to_vec();
+        for (term, _) in self.at_surfaces(record) {
+            let (t, x) = (record.t[0], record.x[0].to_vec());
             self.points.push(TermPoint { term, t, x });
         }
     }
@@ -664,25 +661,37 @@ impl<'w> Walk<'w> {
             let moved = dot(&owed.by_state, record.field[0]) + owed.by_time;
             add(&mut self.w, moved, &time);
         }
-        for place in self.at_surface(record) {
+        for (place, guard) in self.at_surfaces(record) {
             let z = extended.state(record.x[0]);
             let cost = self.terms[place].cost;
             let (by_time, gradient) = cost.at(record.t[0], &z, record.discrete[0])?;
             add(&mut self.w, 1.0, &gradient);
             let moved = by_time + dot(&gradient[..n], record.field[0]);
-            add(&mut self.w, moved, &time);
+            match guard {
+                0 => add(&mut self.w, moved, &time),
+                _ => add(&mut self.w, moved, &instant.time_of(record.guards[guard])?),
+            }
         }
         let is_finite = self.w.iter().all(|value| value.is_finite());
         Ok((!is_finite).then_some("not_finite"))
     }
 
-    /// The places of the terms that count at an instant since a surface brings it about.
-    fn at_surface(&self, record: &InstantRecord) -> impl Iterator<Item = usize> + 'w {
-        let surface = record.guards.first().and_then(|guard| guard.surface());
-        let terms = self.terms.iter().enumerate();
-        let at = terms
-            .filter(move |(_, term)| matches!(term.at, When::Surface(j) if surface == Some(j)));
-        at.map(|(place, _)| place)
+    /// The places of the terms that count at an instant since surfaces bring it about, and of the guards of these.
+    fn at_surfaces<'r>(
+        &self,
+        record: &'r InstantRecord,
+    ) -> impl Iterator<Item = (usize, usize)> + use<'r, 'w> {
+        let guards = record.guards;
+        self.terms
+            .iter()
+            .enumerate()
+            .filter_map(move |(place, term)| {
+                let When::Surface(j) = term.at else {
+                    return None;
+                };
+                let guard = guards.iter().position(|guard| guard.surface() == Some(j))?;
+                Some((place, guard))
+            })
     }
 
     /// Notes on which surfaces actions put the state, for changes of the state before them and of what is asked for.

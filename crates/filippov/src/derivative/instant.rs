@@ -263,6 +263,22 @@ impl Instant<'_, '_> {
         Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))
     }
 
+    /// The derivative of the time at which a guard vanishes, a row.
+    pub fn time_of(&mut self, guard: Guard) -> Result<Row, FieldError> {
+        let z = self.extended.state(self.record.x[0]);
+        let own = self.before.gradient_of(guard, self.record.t[0], &z)?;
+        let rate = own.time + dot(&own.state, self.record.field[0]);
+        Ok(own.state.iter().map(|g| -g / rate).collect())
+    }
+
+    /// Those of the guards that vanish together with the one that fixes the time, and of the surfaces passed with it.
+    pub fn further_times(&mut self) -> Result<SmallVec<[Row; 1]>, FieldError> {
+        let passed = self.passed_with_it()?;
+        let further = self.record.guards.iter().skip(1).copied();
+        let all = further.chain(passed.into_iter().map(Guard::Surface));
+        all.map(|guard| self.time_of(guard)).collect()
+    }
+
     /// The guard that fixes the time, if it is no known time: also that of a start on the surface of an action.
     pub fn guard(&self) -> Option<Guard> {
         let first = self.record.acts.first();
@@ -319,29 +335,31 @@ impl Instant<'_, '_> {
         Ok(false)
     }
 
-    /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.
+    /// Does the same field go on? So it is at the ends of multipliers where nothing else changes: those of several surfaces that are
+    /// left at once, in whatever order a changed motion leaves them.
     fn leaves_as_it_is(&self) -> bool {
         let record = self.record;
         if !record.acts.is_empty() {
             return false;
         }
-        let same = |except: Option<usize>| {
-            let entries = record.mode.map(|mode| mode.entries());
+        let entries = record.mode.map(|mode| mode.entries());
+        let same = |left: &[usize]| {
             let mut all = entries[0].iter().zip(entries[1]).enumerate();
-            all.all(|(j, (a, b))| a == b || Some(j) == except)
+            all.all(|(j, (a, b))| a == b || left.contains(&j))
         };
-        match *record.guards {
-            [Guard::Multiplier { surface, end }] => {
-                !self.extended.system.sticks_at(surface)
-                    && record.mode[1].entries()[surface] == end
-                    && same(Some(surface))
-            }
-            [Guard::Force(surface)] => {
-                record.mode[1].entries()[surface] != 0 && same(Some(surface))
-            }
-            [Guard::Surface(_)] => same(None) && record.field[0] == record.field[1],
-            _ => false,
+        if let [Guard::Surface(_)] = *record.guards {
+            return same(&[]) && record.field[0] == record.field[1];
         }
+        let left = record.guards.iter().map(|guard| match *guard {
+            Guard::Multiplier { surface, end } => {
+                let is_left = entries[1][surface] == end;
+                (is_left && !self.extended.system.sticks_at(surface)).then_some(surface)
+            }
+            Guard::Force(surface) => (entries[1][surface] != 0).then_some(surface),
+            _ => None,
+        });
+        let left: Option<SmallVec<[usize; 2]>> = left.collect();
+        left.is_some_and(|left| !left.is_empty() && same(&left))
     }
 
     /// Does sliding on a surface end on the other side than its multiplier tells? So it is where the fields of both sides become

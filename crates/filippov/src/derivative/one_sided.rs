@@ -4,13 +4,13 @@ use smallvec::{smallvec, SmallVec};
 
 use super::change::{matrices, Change, Row};
 use super::instant::{entered, Instant};
-use super::piece::Piece;
+use super::piece::{is_affine, Piece};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::Guard;
 use crate::system::LieDerivatives;
-use crate::tolerances::AT_SIDE;
-use crate::vectors::dot;
+use crate::tolerances::{AT_SIDE, ROUNDING};
+use crate::vectors::{dot, dot_magnitude};
 
 /// So many surfaces at one instant have all their orders looked at.
 pub(super) const MOST_AT_ONCE: usize = 3;
@@ -84,20 +84,53 @@ impl<'a> Instant<'_, 'a> {
         surfaces.extend(self.passed_with_it()?);
         let differs = |j: usize| entries[0][j] != entries[1][j];
         let are_all = record.acts.is_empty()
-            && (2..=MOST_AT_ONCE).contains(&surfaces.len())
+            && surfaces.len() > 1
             && (0..entries[0].len()).all(|j| surfaces.contains(&j) == differs(j))
             && surfaces.iter().all(|&j| entries[0][j] != 0);
         if !are_all {
             return Ok(None);
         }
+        let orders = match surfaces.len() <= MOST_AT_ONCE {
+            true => orders(&surfaces),
+            false if self.act_apart(&surfaces)? => vec![surfaces],
+            false => return Ok(None),
+        };
         let mut cones = Vec::new();
-        for order in orders(&surfaces) {
+        for order in orders {
             match self.one_after_the_other(&order)? {
                 Some(changes) => cones.push(Cone { order, changes }),
                 None => return Ok(None),
             }
         }
         Ok(Some(cones))
+    }
+
+    /// Does the field jump at each of some surfaces, and of those slid on, by as much whatever the signs of the others are, and along
+    /// them? Their order is of no account then.
+    fn act_apart(&self, surfaces: &[usize]) -> Result<bool, FieldError> {
+        let surfaces = [surfaces, &self.before.sliding].concat();
+        if !is_affine(&self.extended.system, &surfaces) {
+            return Ok(false);
+        }
+        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
+        let (mut jumps, mut normals) = (Vec::new(), Vec::new());
+        for &j in &surfaces {
+            let above = self.before.corner(t, &z, &[(j, 1.0)])?;
+            let mut jump = self.before.corner(t, &z, &[(j, -1.0)])?;
+            jump.iter_mut().zip(&above).for_each(|(b, a)| *b = a - *b);
+            let mut normal = Row::from_elem(0.0, z.len());
+            self.before.gradient(j, t, &z, &mut normal)?;
+            jumps.push(jump);
+            normals.push(normal);
+        }
+        let is_along = |jump: &Row, normal: &Row| {
+            dot(normal, jump).abs() <= ROUNDING * dot_magnitude(normal, jump)
+        };
+        let places = 0..surfaces.len();
+        Ok(places.clone().all(|k| {
+            let mut others = places.clone().filter(|&other| other != k);
+            others.all(|other| is_along(&jumps[k], &normals[other]))
+        }))
     }
 
     fn one_after_the_other(

@@ -8,7 +8,8 @@ use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, OneSided};
 use super::second::{SecondOrder, Timed};
 use crate::error::FieldError;
-use crate::vectors::dot;
+use crate::tolerances::AT_SIDE;
+use crate::vectors::{dot, dot_magnitude};
 
 /// The derivatives of an instant: of its time, and of the state behind it by the state before.
 #[derive(Clone, Debug)]
@@ -95,6 +96,10 @@ impl<'a> Instant<'_, 'a> {
                 timed = Some(own);
             }
         }
+        let further = match passages.len() {
+            1 => self.further_times()?,
+            _ => SmallVec::new(),
+        };
         let mut all = Vec::with_capacity(passages.len());
         for passage in &passages {
             let mut found = InstantDerivative::new(self.record.t[0]);
@@ -102,7 +107,9 @@ impl<'a> Instant<'_, 'a> {
             if let Some(timed) = &timed {
                 found.second_dt.clone_from(&timed.times);
             }
-            let dt = columns.iter().map(|column| dot(&passage.time, column));
+            let dt = columns
+                .iter()
+                .map(|column| common(&passage.time, &further, column));
             found.dt.extend(dt);
             let beside = passage.apply(n, columns);
             found.arrives = !beside.is_empty();
@@ -191,5 +198,18 @@ impl<'a> Instant<'_, 'a> {
             }]));
         }
         Ok(Err(lost))
+    }
+}
+
+/// The derivative of a time by a column; NaN where the times of further guards that vanish there have others.
+fn common(time: &Row, further: &[Row], column: &[f64]) -> f64 {
+    let own = dot(time, column);
+    let is_same = |other: &Row| {
+        let terms = dot_magnitude(time, column).max(dot_magnitude(other, column));
+        (dot(other, column) - own).abs() <= AT_SIDE * terms
+    };
+    match further.iter().all(is_same) {
+        true => own,
+        false => f64::NAN,
     }
 }

@@ -742,7 +742,8 @@ impl<'a> Piece<'a> {
     }
 }
 
-fn is_affine(system: &TracedSystem, sliding: &[usize]) -> bool {
+/// Is the field affine in the signs of these surfaces?
+pub(super) fn is_affine(system: &TracedSystem, surfaces: &[usize]) -> bool {
     let known = system.affine_signs();
-    known.is_some_and(|affine| affine.affine_parts(sliding).is_some())
+    known.is_some_and(|affine| affine.affine_parts(surfaces).is_some())
 }

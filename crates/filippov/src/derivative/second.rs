@@ -95,7 +95,8 @@ impl SecondOrder<'_, '_> {
         columns: &[Vec<f64>],
         second: &Second,
     ) -> Result<Option<Timed>, FieldError> {
-        if self.time.iter().any(|v| v.is_nan()) {
+        let is_one = !self.goes_on || self.record.guards.len() == 1;
+        if !is_one || self.time.iter().any(|v| v.is_nan()) {
             return Ok(None);
         }
         let (t, field) = (self.record.t[0], self.record.field[0]);
