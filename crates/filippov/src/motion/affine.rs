@@ -1,6 +1,6 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
-use super::canopy::root_ends;
+use super::canopy::RootWatch;
 use super::ties::are_parallel;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
@@ -187,8 +187,8 @@ impl<'a> AffineLaw<'a> {
     }
 
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
-    /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
-    pub fn ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
+    /// and the stability ([`RootWatch`]). Only for a few surfaces; the friction of many bodies is stable for good.
+    pub(super) fn ends(&mut self, watch: &mut RootWatch) -> [f64; 2] {
         if self.parts.surfaces().len() > MOST_MEETING || self.is_shared() {
             return [1.0, 1.0];
         }
@@ -200,23 +200,25 @@ impl<'a> AffineLaw<'a> {
         let mut of = self.known_ends.take().unwrap_or_default().0;
         of.clear();
         of.extend_from_slice(values);
-        let ends = self.present_ends(oscillates);
+        let ends = self.present_ends(watch);
         self.known_ends = Some((of, ends));
         ends
     }
 
     /// Those of the last evaluation.
-    fn present_ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
+    fn present_ends(&mut self, watch: &mut RootWatch) -> [f64; 2] {
         let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
         if m > 2 && normal.is_diagonal() {
-            return uncoupled_margins((0..m).map(|i| self.kappa[i] * normal.diagonal(i)));
+            let entries = || (0..m).map(|i| self.kappa[i] * normal.diagonal(i));
+            let unit = watch.unit(entries().fold(0.0, |size, v| v.abs().max(size)));
+            return uncoupled_margins(entries().map(|v| v * unit));
         }
         let mut jacobian = Matrix::zeros(m);
         for i in 0..m {
             normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
         }
         if m > 2 {
-            return root_ends((&jacobian, false), &self.kappa, oscillates);
+            return watch.ends((&jacobian, false), &self.kappa);
         }
         let size = |i: usize| {
             let entries = normal.row(i).map(|(_, v)| v.abs());

@@ -65,11 +65,11 @@ impl Canopy {
     }
 
     /// Finds the multipliers that continue the first of those in `tracked` that can be continued, and writes the field. Returns the
-    /// multipliers with the exit functions of the root ([`root_ends`]); `None` if there is no root.
-    pub fn solve(
+    /// multipliers with the exit functions of the root ([`RootWatch`]); `None` if there is no root.
+    pub(super) fn solve(
         &mut self,
         tracked: &[&[f64]],
-        oscillates: &mut Option<bool>,
+        watch: &mut RootWatch,
         dx: &mut [f64],
         patience: Patience,
     ) -> Option<(Vec<f64>, [f64; 2])> {
@@ -84,7 +84,7 @@ impl Canopy {
         } else {
             let lambda = solve_many(&fields, tracked, patience)?;
             let jacobian = (fields.jacobian(&lambda), fields.groups().len() > 1);
-            let ends = root_ends((&jacobian.0, jacobian.1), &self.kappa, oscillates);
+            let ends = watch.ends((&jacobian.0, jacobian.1), &self.kappa);
             // Beyond a fold Newton's method may find the other root, which is never followed.
             (ends[0] > 0.0).then_some((lambda, ends))?
         };
@@ -132,25 +132,47 @@ fn is_continued(fields: &NormalFields, last: &[f64], root: &[f64]) -> bool {
     (0..m).all(|i| (0..m).map(|j| deviation(i, j)).sum::<f64>() < TRACKED_CHANGE)
 }
 
-/// The exit functions of a root of three and more surfaces with this matrix G: that two roots meet, and that it is no
-/// longer stable with the surfaces scaled by `kappa` ([`stability_margins`]).
-///
-/// Where the motion begins at a root that is not stable so, the regularised motion oscillates around it. Then the second
-/// function ends it where the root is not stable for any scaling. `oscillates` is found out if it is not known.
-pub fn root_ends(
-    (jacobian, in_parts): (&Matrix, bool),
-    kappa: &[f64],
-    oscillates: &mut Option<bool>,
-) -> [f64; 2] {
-    let [fold, stability] = stability_margins(&jacobian.with_rows_scaled(kappa), in_parts);
-    if *oscillates.get_or_insert(stability <= 0.0) {
-        let size = |i: usize| (0..kappa.len()).fold(0.0_f64, |s, j| s.max(jacobian[(i, j)].abs()));
-        let units: Vec<f64> = (0..kappa.len()).map(|i| 1.0 / size(i)).collect();
-        [
-            fold,
-            scaling_margin(&jacobian.with_rows_scaled(&units)).max(stability),
-        ]
-    } else {
-        [fold, stability]
+/// What tells when the root of three and more surfaces ends, from its matrices G along a motion.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RootWatch {
+    /// Where the motion begins at a root that is not stable for its scaling, the regularised motion oscillates around it; none as long
+    /// as it is not known.
+    pub oscillates: Option<bool>,
+    /// The unit of G at the start of the motion: products of many entries are beside multipliers of size 1.
+    unit: Option<f64>,
+}
+
+impl RootWatch {
+    /// The watch of a motion that begins.
+    pub fn new(oscillates: bool) -> Self {
+        RootWatch {
+            oscillates: oscillates.then_some(true),
+            unit: None,
+        }
+    }
+
+    /// The factor that makes G of size 1 at the start, from its size now.
+    pub fn unit(&mut self, size: f64) -> f64 {
+        *self.unit.get_or_insert(1.0 / size.max(f64::MIN_POSITIVE))
+    }
+
+    /// The exit functions of a root with this matrix G: that two roots meet, and that it is no longer stable with the surfaces scaled
+    /// by `kappa` ([`stability_margins`]). If the motion oscillates around it the second function ends it where the root is not
+    /// stable for any scaling.
+    pub fn ends(&mut self, (jacobian, in_parts): (&Matrix, bool), kappa: &[f64]) -> [f64; 2] {
+        let unit = self.unit(jacobian.with_rows_scaled(kappa).size());
+        let factors: Vec<f64> = kappa.iter().map(|factor| factor * unit).collect();
+        let [fold, stability] = stability_margins(&jacobian.with_rows_scaled(&factors), in_parts);
+        if *self.oscillates.get_or_insert(stability <= 0.0) {
+            let size =
+                |i: usize| (0..kappa.len()).fold(0.0_f64, |s, j| s.max(jacobian[(i, j)].abs()));
+            let units: Vec<f64> = (0..kappa.len()).map(|i| 1.0 / size(i)).collect();
+            [
+                fold,
+                scaling_margin(&jacobian.with_rows_scaled(&units)).max(stability),
+            ]
+        } else {
+            [fold, stability]
+        }
     }
 }

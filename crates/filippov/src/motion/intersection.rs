@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use super::guard::Guards;
 use super::weights::RuleFailure;
+use super::canopy::RootWatch;
 use super::{
     AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
 };
@@ -54,8 +55,8 @@ pub struct IntersectionField<'a> {
     is_rootless: bool,
     /// How far multipliers may go beyond their ends, by exit function.
     slack: Vec<f64>,
-    /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
-    oscillates: Option<bool>,
+    /// When the root of three and more surfaces ends.
+    watch: RootWatch,
     projector: Projector,
     /// The factor of the term that draws the motion back, in place of the projection.
     restoring: Option<f64>,
@@ -100,7 +101,7 @@ impl<'a> IntersectionField<'a> {
             start: None,
             is_rootless: false,
             slack: vec![0.0; 2 * set.len()],
-            oscillates: None,
+            watch: RootWatch::default(),
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             restoring: None,
             units: Units::ONES,
@@ -220,7 +221,7 @@ impl<'a> IntersectionField<'a> {
         self.tracked.clear();
         self.tracked.push((f64::INFINITY, lambda.to_vec()));
         self.start = None;
-        self.oscillates = oscillates.then_some(true);
+        self.watch = RootWatch::new(oscillates);
         if let Some(law) = &mut self.affine {
             law.begin();
         }
@@ -257,7 +258,7 @@ impl<'a> IntersectionField<'a> {
 
     /// Does the regularised motion oscillate around the root, for three and more surfaces?
     pub fn oscillates(&self) -> bool {
-        self.oscillates == Some(true)
+        self.watch.oscillates == Some(true)
     }
 
     /// The multipliers at the last evaluation, or if there are none those that were found nearest to time t.
@@ -334,7 +335,7 @@ impl<'a> IntersectionField<'a> {
             if law.multipliers().iter().all(|l| l.is_finite()) {
                 self.lambda.clear();
                 self.lambda.extend(law.multipliers());
-                let ends = law.ends(&mut self.oscillates);
+                let ends = law.ends(&mut self.watch);
                 self.fill_exits(ends);
                 return Ok(());
             }
@@ -348,7 +349,7 @@ impl<'a> IntersectionField<'a> {
                     canopy.evaluate(self.system, &self.setting.at(t, x), self.units)?;
                 canopy.solve(
                     &by_distance(&self.tracked, t),
-                    &mut self.oscillates,
+                    &mut self.watch,
                     dx,
                     self.patience,
                 )

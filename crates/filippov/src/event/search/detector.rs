@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::bounds::{Piece, RootPiece};
 use crate::error::FieldError;
 use crate::event::Multiple;
-use crate::motion::{Exits, Monitored, Run};
+use crate::motion::{Exits, Guard, Monitored, Run};
 use crate::tolerances::ROUNDING;
 
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
@@ -34,8 +34,8 @@ pub(crate) struct Detector {
     pub enclosed_roots: RefCell<Vec<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
     pub right: Vec<(f64, f64)>,
-    /// Rounding of the exit functions in this step, once it was needed.
-    pub(super) exit_noise: Option<f64>,
+    /// Rounding of the exit functions in this step, once it was needed: of those of multipliers, and of those of their root.
+    pub(super) exit_noise: [Option<f64>; 2],
 }
 
 impl Detector {
@@ -51,7 +51,7 @@ impl Detector {
             enclosed_exits: RefCell::default(),
             enclosed_roots: RefCell::default(),
             right: Vec::new(),
-            exit_noise: None,
+            exit_noise: [None; 2],
         }
     }
 
@@ -61,7 +61,7 @@ impl Detector {
         self.enclosed_exits.get_mut().clear();
         self.enclosed_roots.get_mut().clear();
         self.margin.clear();
-        self.exit_noise = None;
+        self.exit_noise = [None; 2];
         self.is_probed = false;
     }
 
@@ -154,9 +154,13 @@ impl Detector {
         end: &[f64],
     ) -> Result<f64, FieldError> {
         let Some(j) = m.surface() else {
-            let seen = &run.seen;
-            let noise = *self.exit_noise.get_or_insert_with(|| {
-                4.0 * ROUNDING * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
+            let is_of_root = |m: &Monitored| matches!(m.guard, Guard::Root(_));
+            let of_root = is_of_root(m);
+            let noise = *self.exit_noise[usize::from(of_root)].get_or_insert_with(|| {
+                let exits = run.motion.monitored.iter();
+                let alike = exits.filter(|m| m.surface().is_none() && is_of_root(m) == of_root);
+                let sizes = alike.map(|m| run.seen[m.place].size());
+                4.0 * ROUNDING * sizes.fold(0.0_f64, f64::max)
             });
             return Ok(noise);
         };
