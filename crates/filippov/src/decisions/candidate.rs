@@ -39,6 +39,8 @@ pub(super) enum Verdict {
     Viable(Viable),
     /// This guard begins negative.
     Fails(Guard),
+    /// This multiplier is within rounding of its end and comes to it at once: the mode ends in a moment.
+    Fades(Guard, Viable),
     /// The motion stays on this surface, and the field beyond presses it there: it is that of the mode that slides there too, with a
     /// multiplier at its end.
     Slides(usize, Viable),
@@ -52,6 +54,7 @@ pub(super) enum Verdict {
 struct Outset {
     viable: Viable,
     failing: Option<Guard>,
+    fading: Option<Guard>,
     /// A surface on which it stays, pressed by the field beyond.
     slides: Option<usize>,
     is_open: bool,
@@ -73,12 +76,23 @@ impl Outset {
         }
     }
 
+    /// Adds the end of a multiplier, `left` before it.
+    fn add_end(&mut self, guard: Guard, left: f64, germ: Germ) {
+        match germ {
+            Germ::Begins(Leading { order: 1.., value }) if value < 0.0 && left > 0.0 => {
+                self.fading = self.fading.or(Some(guard));
+            }
+            germ => self.add(guard, 1, germ),
+        }
+    }
+
     fn verdict(self) -> Verdict {
-        match (self.failing, self.slides) {
-            (Some(guard), _) => Verdict::Fails(guard),
-            (None, Some(j)) => Verdict::Slides(j, self.viable),
-            (None, None) if self.is_open => Verdict::Open(self.viable.next),
-            (None, None) => Verdict::Viable(self.viable),
+        match (self.failing, self.fading, self.slides) {
+            (Some(guard), ..) => Verdict::Fails(guard),
+            (None, Some(guard), _) => Verdict::Fades(guard, self.viable),
+            (None, None, Some(j)) => Verdict::Slides(j, self.viable),
+            (None, None, None) if self.is_open => Verdict::Open(self.viable.next),
+            (None, None, None) => Verdict::Viable(self.viable),
         }
     }
 }
@@ -147,7 +161,11 @@ impl Candidate<'_> {
         for outset in outsets {
             match (outset?.verdict(), &found) {
                 (Verdict::Viable(viable), _) => return Ok(Verdict::Viable(viable)),
-                (Verdict::Fails(_) | Verdict::Slides(..), Verdict::Open(_)) => {}
+                (
+                    Verdict::Fails(_) | Verdict::Fades(..) | Verdict::Slides(..),
+                    Verdict::Open(_),
+                ) => {}
+                (Verdict::Fails(_), Verdict::Fades(..)) => {}
                 (verdict, _) => found = verdict,
             }
         }
@@ -163,6 +181,7 @@ impl Candidate<'_> {
         Outset {
             viable: Viable::strictly(next),
             failing: None,
+            fading: None,
             slides: None,
             is_open: false,
         }
@@ -191,10 +210,9 @@ impl Candidate<'_> {
             _ => self.fields.interpolate(&place).to_vec(),
         };
         let is_tangent = |i: usize| g[i].abs() <= self.noise[i];
-        let is_at_end = |index: usize| {
-            let sense = [1.0, -1.0][index % 2];
-            1.0 + sense * lambda[index / 2] <= AT_SIDE
-        };
+        // Before the end with this index.
+        let left = |index: usize| 1.0 + [1.0, -1.0][index % 2] * lambda[index / 2];
+        let is_at_end = |index: usize| left(index) <= AT_SIDE;
         let any_end = (0..2 * lambda.len()).any(is_at_end);
         let any_tangent = self.surfaces().any(|(i, ..)| is_tangent(i));
         let mut outset = self.outset(lambda);
@@ -235,10 +253,12 @@ impl Candidate<'_> {
             return self.at_tied_end(at, outset, *tie, lambda);
         }
         let slid = self.entries.sliding_set();
-        let guards = slid.flat_map(|i| Guard::ends(self.meeting.surfaces[i]));
-        for (index, guard) in guards.enumerate().filter(|(index, _)| is_at_end(*index)) {
-            let germ = series.as_ref().map(|series| series.of_exit(index));
-            outset.add(guard, 1, germ.unwrap_or(Germ::Unknown));
+        let guards = slid.flat_map(|i| Guard::ends(self.meeting.surfaces[i]).map(|end| (i, end)));
+        for (index, (i, guard)) in guards.enumerate().filter(|(index, _)| is_at_end(*index)) {
+            // Where the field of a side is tangent up to noise the multiplier is at its end.
+            let blur = self.noise[i] / self.fields.row_size(i);
+            let germ = series.as_ref().map(|series| series.of_exit(index, blur));
+            outset.add_end(guard, left(index), germ.unwrap_or(Germ::Unknown));
         }
         Ok(outset)
     }

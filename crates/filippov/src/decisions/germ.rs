@@ -107,8 +107,8 @@ impl MotionSeries {
         Ok(self.first(1, coefficient, size))
     }
 
-    /// How the exit function with this index begins.
-    pub fn of_exit(&self, index: usize) -> Germ {
+    /// How the exit function with this index begins, where multipliers that differ by `blur` are one.
+    pub fn of_exit(&self, index: usize, blur: f64) -> Germ {
         let Some(place) = self.jets.exit(index) else {
             return Germ::Unknown;
         };
@@ -118,7 +118,12 @@ impl MotionSeries {
         let orders = 0..=self.jets.order();
         let largest = orders.map(|k| coefficient(k).abs() / fastest.powi(k as i32));
         let largest = largest.filter(|v| v.is_finite()).fold(0.0, f64::max);
-        self.first(0, coefficient, |k| largest * fastest.powi(k as i32))
+        // The value itself is a difference of numbers of size 1.
+        let of_value = (blur / VANISHING_GERM).max(1.0);
+        let least = |k: usize| if k == 0 { of_value } else { 0.0 };
+        self.first(0, coefficient, |k| {
+            least(k).max(largest * fastest.powi(k as i32))
+        })
     }
 
     fn first(

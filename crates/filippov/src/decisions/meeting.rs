@@ -6,7 +6,7 @@ use super::first_order::resolution;
 use super::germ::{surfaces_left, Found};
 use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
-use super::rule::Meeting;
+use super::rule::{How, Meeting};
 use super::spiral::outward_leap;
 use super::surroundings::Surroundings;
 use crate::cube::{stable_roots_with_border, NormalFields};
@@ -15,6 +15,7 @@ use crate::mode::Mode;
 use crate::motion::ModeField;
 use crate::status::{Stop, Warning, WarningCode};
 use crate::switching::{Continuation, Resolution};
+use crate::tolerances::AT_SIDE;
 
 /// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.
 pub(super) fn resolve_first_order(
@@ -47,7 +48,11 @@ fn follow(
         Ok(resolution) if !resolution.degenerate => resolution,
         other => return decide_undecided(at, notes, place, other.err()),
     };
-    if !has_root(&around.fields, &resolution, at) {
+    // A multiplier that starts at its end may go beyond it.
+    let mut multipliers = resolution.multipliers.iter();
+    let starts_at_end = !matches!(place.how, How::Event(_))
+        && multipliers.any(|lambda| 1.0 - lambda.abs() <= AT_SIDE);
+    if starts_at_end || !has_root(&around.fields, &resolution, at) {
         if let Ok(decided) = decide_by_germs(at, notes, place)? {
             return Ok(decided);
         }

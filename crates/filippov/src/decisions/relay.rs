@@ -77,7 +77,11 @@ pub(super) fn decide_by_relay(
     }
     let is_certain = found.uniqueness != Uniqueness::Unknown;
     let is_few = surfaces.len() <= MOST_MEETING;
-    if !is_certain && is_few || !is_event && !found.degenerate.is_empty() {
+    // A multiplier that starts at its end may go beyond it: germs tell.
+    let mut pairs = found.signs.iter().zip(&found.modes);
+    let starts_at_end = pairs.any(|(sign, &mode)| mode == 0 && 1.0 - sign.abs() <= AT_SIDE);
+    let is_open = !found.degenerate.is_empty() || is_few && starts_at_end;
+    if !is_certain && is_few || !is_event && is_open {
         return Ok(None);
     }
     let_go(at, mode, surfaces, &mut found);

@@ -60,7 +60,7 @@ pub(super) fn survey(
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
     let mut found = Survey::default();
-    let mut pressed = Vec::new();
+    let (mut pressed, mut fading) = (Vec::new(), Vec::new());
     for index in 0..3_usize.pow(m as u32) {
         let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
         if at.patience.is_over() {
@@ -138,6 +138,7 @@ pub(super) fn survey(
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
+            Verdict::Fades(guard, viable) => fading.push((guard, viable)),
             Verdict::Slides(j, viable) => pressed.push((j, viable)),
             Verdict::Untold => found.open.push(mode),
             Verdict::Open(next) => match try_mode(at, notes, &next, meeting.surfaces, ROUNDING)? {
@@ -148,6 +149,13 @@ pub(super) fn survey(
                 Trial::WithinRounding if is_beside => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
+        }
+    }
+    let is_other = !found.viable.is_empty();
+    for (guard, viable) in fading {
+        match is_other {
+            true => found.failing.push((viable.next.mode, guard)),
+            false => found.viable.push(viable),
         }
     }
     for (j, viable) in pressed {

@@ -94,6 +94,21 @@ pub fn first_zero_sampled(
             ..Isolated::default()
         });
     }
+    // There up to rounding: what it is clear of rounding first tells, however near to the start that is.
+    if values[0] <= 0.0 {
+        for k in (1..=FIRST_PLACES).rev() {
+            let value = g(a + (b - a) * 16.0_f64.powi(-k))?;
+            if value < -noise {
+                return Ok(Isolated {
+                    zero: Some(Zero::Crossing(Bracket::at(a, values[0]))),
+                    ..Isolated::default()
+                });
+            }
+            if value > noise {
+                break;
+            }
+        }
+    }
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let mut search = Search {
         g,
@@ -116,6 +131,9 @@ pub fn first_zero_sampled(
         ..search.result
     })
 }
+
+/// Places behind a start within rounding of zero that are looked at: each is a sixteenth of the next one.
+const FIRST_PLACES: i32 = 12;
 
 /// Points off the regular grid, so that an oscillation in step with the samples is noticed.
 pub const PROBES: [f64; 2] = [0.39, 0.815];

@@ -3,9 +3,9 @@
 use filippov_expr::sort_few;
 use smallvec::SmallVec;
 
+use super::canopy::RootWatch;
 use super::guard::Guards;
 use super::weights::RuleFailure;
-use super::canopy::RootWatch;
 use super::{
     AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
 };

@@ -109,10 +109,15 @@ impl StepControl {
         let (t, x, scale, field) = (at.t, &at.x, &at.scale, &mut at.motion.field);
         let derivative = steppers.start_derivative();
         let mode = &at.motion.mode;
-        let mut dt = match self.paces.first_step(mode, x, derivative, scale) {
+        // What was proposed while t was nearer to 0 may be too short to go on with here.
+        let is_step = |dt: &f64| *dt > shortest_step(t);
+        let pace = self.paces.first_step(mode, x, derivative, scale);
+        let mut dt = match pace.filter(is_step) {
             Some(dt) => dt.min(longest),
-            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
-            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
+            None if is_step(&self.dt) => {
+                restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
+            }
+            None => initial_step(field, t, x, derivative, scale, longest)?,
         };
         let place = at.motion.setting().at(t, x);
         for (j, leading) in left {
