@@ -153,25 +153,32 @@ impl Known {
         mut region: Mode,
     ) -> Result<Jumps, FieldError> {
         let (mut jumped, mut landed) = (Vec::new(), Vec::new());
-        // A jump may make others jump.
+        let (before, mut round) = (region.clone(), 0);
+        // A jump may make others jump, and may take back what a sign that was still the old one told.
         loop {
             let h = at.surface_values(notes, &region.signs())?;
-            let before = jumped.len();
+            let mut is_settled = true;
             landed.clear();
             for j in (0..h.len()).filter(|j| !meeting.surfaces.contains(j)) {
                 let noise = self.noise(at, j, h[j], &region)?;
-                if (h[j] - self.h[j]).abs() <= noise {
-                    continue;
-                }
-                let side = if h[j] < 0.0 { -1 } else { 1 };
-                if h[j].abs() <= noise {
+                let jumps = (h[j] - self.h[j]).abs() > noise;
+                let side = match jumps && h[j].abs() > noise {
+                    true if h[j] < 0.0 => -1,
+                    true => 1,
+                    false => before.entries()[j],
+                };
+                if jumps && h[j].abs() <= noise {
                     landed.push(j);
-                } else if region.entries()[j] != side {
+                }
+                if region.entries()[j] != side {
                     region.set(j, side);
-                    jumped.push(j);
+                    is_settled = false;
                 }
             }
-            if jumped.len() == before || jumped.len() > h.len() {
+            round += 1;
+            if is_settled || round > h.len() + 1 {
+                let pairs = before.entries().iter().zip(region.entries()).enumerate();
+                jumped.extend(pairs.filter(|(_, (a, b))| a != b).map(|(j, _)| j));
                 jumped.extend(&landed);
                 return Ok(Jumps {
                     jumped,
