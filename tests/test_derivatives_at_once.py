@@ -95,7 +95,7 @@ def test_costs_at_the_switches_of_each() -> None:
         return fl.gradient(system, (0, 8), [1.0, 0.5] * 2, instants=costs, wrt=wrt, params=params, **TIGHT)
 
     _, found = total(["k0", "k1", "F"])
-    # The second derivative jumps where the masses change their order: differences are off by about their step.
+    # The second derivative jumps where the masses change their order: differences are off by that.
     for name, value in (("k0", 1.0), ("k1", 1.0), ("F", 0.3)):
         above, below = (total(["F"], **{name: value + change})[0] for change in (1e-6, -1e-6))
         assert abs(found[name] - (above - below) / 2e-6) < 2e-6

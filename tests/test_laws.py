@@ -204,6 +204,23 @@ def samples(E, n_periods):
     return sol, sol.switches.y_after[sol.switches.kind == "clock", 0]
 
 
+@pytest.mark.parametrize(
+    "floor",
+    [
+        lambda t, x: np.floor((np.sin(t) + 1) / 2),
+        lambda t, x: (np.sin(t) + 1) // 2,
+        lambda t, x: np.mod(np.sin(t) + 1, 2) - np.sin(t) - 1,
+        lambda t, x: np.floor(np.exp(-((t + 0.1) ** 2))),
+        lambda t, x: np.floor(np.cos(x[0] + 0.5) ** 2),
+    ],
+)
+def test_a_function_may_stay_between_two_whole_numbers(floor):
+    run = fl.solve_ivp(lambda t, x: [floor(t, x) - x[0]], (0, 5), [0.2], rtol=1e-10)
+    assert run.success
+    assert len(run.switches) == 0
+    np.testing.assert_allclose(run.y[0, -1], 0.2 * math.exp(-5), rtol=1e-8)
+
+
 @pytest.mark.parametrize(("E", "period"), [(24.0, 1), (25.0, 2), (28.0, 2)])
 def test_a_buck_converter_has_period_one_then_two(E, period):
     _, v = samples(E, 600)

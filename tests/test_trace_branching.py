@@ -451,3 +451,17 @@ def test_arrays_of_the_call_are_not_memory() -> None:
     sol = fl.solve_ivp(fun, (0, 1), [1.0, 2.0])
     assert sol.success
     assert not sol.warnings
+
+
+def test_a_decision_by_parameters_is_the_same_in_every_call() -> None:
+    def fun(t: Any, x: Any, p: float = -2.0, q: float = 2.0) -> Any:
+        first = 1.0 if p < np.where(x[0] > 0, 1.0, -1.0) else 3.0
+        second = 1.0 if q > np.interp(x[0], [-1.0, 0.0, 1.0], [0.0, 0.5, 0.2]) else 2.0
+        return [first * second]
+
+    sol = fl.System(fun, n=1).solve((0, 3), [0.2])
+    np.testing.assert_allclose(sol.y[0, -1], 3.2)
+    both = {"p": 0.0, "q": 0.3}
+    sol = fl.System(fun, n=1).solve((0, 0.2), [-0.5], both)
+    # Speeds 3, 6 from -0.4 on, where the table is above 0.3, and 2 above zero.
+    np.testing.assert_allclose(sol.y[0, -1], 2.0 * (0.2 - 0.1 / 3 - 0.4 / 6), rtol=1e-6)

@@ -105,6 +105,11 @@ FORMS: dict[str, Callable[..., Any]] = {
     "clip": lambda t, x: np.clip(x, -1, 1),
     "clip method": lambda t, x: x.clip(-1, 0.5),
     "clip one side": lambda t, x: [np.clip(x[0], None, 1), *np.clip(x[1:], -1, None)],
+    "clip without an end": lambda t, x: [
+        np.clip(x[0], 0, np.inf),
+        x[1].clip(-np.inf, 0.5),
+        min(np.inf, np.where(x[2] > 0.5, x[2], 0.0)),
+    ],
     "clip number": lambda t, x: [np.clip(x[0], -1, x[1] + 3), x[1], x[2]],
     "select": lambda t, x: np.select([x < -1, x < 1], [-x, x**2], 7.0),
     "piecewise": lambda t, x: np.piecewise(x, [x < -1, x >= 1], [lambda z: -z, lambda z: z**2, 0.25]),

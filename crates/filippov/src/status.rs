@@ -216,9 +216,12 @@ impl Stop {
                  The field may be singular here, stiff (method=\"Rodas5P\"), or jump without a declared surface."
             ),
             Stop::NoProgress { surfaces } => format!(
-                "Stopped at t = {t:.10} in mode ({mode}): switches at {} follow one another without any progress of \
+                "Stopped at t = {t:.10} in mode ({mode}): switches{} follow one another without any progress of \
                  time. They accumulate here, or the field on one side is not defined up to its surface.",
-                names(surfaces)
+                match surfaces.is_empty() {
+                    true => String::new(),
+                    false => format!(" at {}", names(surfaces)),
+                }
             ),
             Stop::Chatter { since } => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): since t = {since:.10} the motion chatters along a jump of the \

@@ -8,6 +8,7 @@ merged into choices by the sign of the switching functions, from the deepest upw
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -173,6 +174,7 @@ class Tracer:
         self.has_pieces = False
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
         self._signs: dict[int, float] = {}
+        self._asked_before_laws: set[int] = set()
         self._continued: dict[int, int] = {}
         self.ends_of_roots: list[int] = []
         self._roots: dict[int, tuple[int, Callable[[int], int] | None]] = {}
@@ -300,6 +302,10 @@ class Tracer:
 
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
+        for bound, other in ((first, second), (second, first)):
+            limit = self.builder.as_constant(bound)
+            if limit is not None and math.isinf(limit):
+                return bound if (limit > 0.0) == largest else other
         whole = self.builder.binary("subtract", first, second)
         difference = self.builder.without_cancelled(whole)
         known = self.sign_everywhere(difference)
@@ -346,7 +352,12 @@ class Tracer:
         what a floor is taken of, as of ``x - np.floor(x)``.
         """
         known = self.known_sign(node) if self.parameters else None
-        if known is None and self.laws.names and self.builder.has_signs(node):
+        if known is not None or not self.builder.has_signs(node) or node in self._asked_before_laws:
+            return known
+        if not self.laws.names:
+            # Once a law is known its sign may be too: another call gets the same answer all the same.
+            self._asked_before_laws.add(node)
+        else:
             self.pieces(node)
             known = self._signs.get(node)
             self.has_pieces |= known is not None

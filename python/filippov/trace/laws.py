@@ -196,7 +196,10 @@ class Laws:
         knots = [] if low is None else [low + 0.5]
         offsets = [0.0] if low is None else [1.0, 0.0]
         if high is not None and (low is None or high > low):
-            knots.append(high - 0.5)
+            if low is not None and high == low + 1:  # there is no whole number in between
+                offsets.pop()
+            else:
+                knots.append(high - 0.5)
             offsets.append(-1.0)
         place = self._state(tracer, _Law("place", (level,), tuple(knots)), "place")
         return builder.binary("add", distance, self.entry(tracer, place, tuple(offsets), name="end"))
