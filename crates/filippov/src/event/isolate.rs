@@ -94,17 +94,18 @@ pub fn first_zero_sampled(
             ..Isolated::default()
         });
     }
-    // There up to rounding: what it is clear of rounding first tells, however near to the start that is.
+    // There up to rounding: the first value that is clear of it tells, however near to the start that is.
     if values[0] <= 0.0 {
+        let clear = HUGGING * noise;
         for k in (1..=FIRST_PLACES).rev() {
             let value = g(a + (b - a) * 16.0_f64.powi(-k))?;
-            if value < -noise {
+            if value < -clear {
                 return Ok(Isolated {
                     zero: Some(Zero::Crossing(Bracket::at(a, values[0]))),
                     ..Isolated::default()
                 });
             }
-            if value > noise {
+            if value > clear {
                 break;
             }
         }
