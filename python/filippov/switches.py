@@ -48,7 +48,7 @@ class InstantDerivative(NamedTuple):
     t : float
         The time.
     dt : ndarray, shape (k,)
-        Its derivative by each column.
+        Its derivative by each column; NaN where surfaces that are met at one time have different ones.
     saltation : ndarray, shape (n, n)
         The saltation matrix: the derivative of the state after by that before, at one time.
     saltation_params : ndarray, shape (n, number of parameters)

@@ -16,6 +16,7 @@ import numpy as np
 from filippov.cycles.arclength import Place, Step, corrected, guess_through, place_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
+from filippov.cycles.codimension_two import CODIMENSION_TWO
 from filippov.cycles.cycle import Cycle, cycle_of, in_parts
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
@@ -222,9 +223,10 @@ def _checked(
         raise InputError(f"bounds: the start has {name} = {value:g}, outside of ({low:g}, {high:g})")
     if switch not in ("follow", "stop", "ignore"):
         raise InputError(f'switch: "follow", "stop" or "ignore", not {switch!r}')
-    codes = CODES if isinstance(detect, str) and detect == "all" else detect
-    if isinstance(codes, str) or not isinstance(codes, Iterable) or any(c not in CODES for c in codes):
-        raise InputError(f'detect: "all" or codes among {", ".join(CODES)}, not {detect!r}')
+    known = [code for code in CODES if code not in CODIMENSION_TWO]
+    codes = known if isinstance(detect, str) and detect == "all" else detect
+    if isinstance(codes, str) or not isinstance(codes, Iterable) or any(c not in known for c in codes):
+        raise InputError(f'detect: "all" or codes among {", ".join(known)}, not {detect!r}')
     share = _FIRST_STEP if step is None else positive("step", step) / (high - low)
 
     return _Settings(
