@@ -872,3 +872,18 @@ def test_a_curve_of_hopf_points_ends_where_they_end() -> None:
             fl.continuation(hopf, ("b1", "b2"), ranges, **wrong)
     with pytest.raises(fl.InputError, match="max_points: a positive whole number is needed"):
         fl.continuation(hopf, ("b1", "b2"), ranges, max_points=0)
+
+
+def test_a_branch_ends_where_it_changes_at_the_end_of_the_range() -> None:
+    def rates(t: Any, x: Any, F: float = 0.1) -> Any:
+        return x[1], 1.5 * np.cos(0.6 * t) - x[0] - 0.1 * x[1] - F * np.sign(x[1])
+
+    # A wall that takes all speed: the body stays at it, and friction holds it where it turns.
+    wall = fl.Reset(lambda t, x: 1.0 - x[0], lambda t, x: [x[0], 0.0 * x[1]], direction="down")
+    cycle = fl.limit_cycle(fl.System(rates, n=2, resets=wall), [0.0, 0.5])
+    branch = fl.continuation(cycle, "F", (0.0, 0.6))
+    values = branch.data.F.values
+    assert values.min() >= 0.0
+    assert values.max() <= 0.6
+    assert min(point.params["F"] for point in branch.special) > -1e-9
+    assert branch.reason.count("F = 0 is the end of the range") == 2

@@ -395,7 +395,7 @@ class _Side:
                 is_long = ds > (_SHORTEST_STEP if isinstance(self.here.curve, EquilibriumCurve) else 4e-3)
                 is_vanishing = not is_long or self._leg_vanishes_within(ds)
                 if is_vanishing and self._goes_beyond_a_vanishing_leg(max(ds, 1e-3)):
-                    if self.is_stopped:
+                    if self.is_stopped or self._has_left_range(curve):
                         return
                     ds = min(self.settings.step, 4 * ds)
                 elif ds > _SHORTEST_STEP:
@@ -407,6 +407,8 @@ class _Side:
             if not goes_on or self._closes() or self._vanishes() or self._grows():
                 return
             if self.here.curve is not curve:
+                if self._has_left_range(curve):
+                    return
                 ds = min(ds, _STEP_BEHIND)  # near a fold of both the branch bends much
                 continue
             ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
@@ -524,6 +526,18 @@ class _Side:
             return False
         outward = -1.0 if value <= low else 1.0
         return bool(self.here.place.tangent[-1] * outward > 0) or len(self.points) > 1
+
+    def _has_left_range(self, before: AnyCurve) -> bool:
+        """Whether the branch goes on behind a change out of the range: it ends at the special point."""
+        (low, high), name = self.settings.bounds, self.settings.name
+        value = float(self.here.place.w[-1])
+        if low <= value <= high:
+            return False
+        self.points.pop()
+        self.reason = f"{name} = {low if value < low else high:g} is the end of the range"
+        last = self.special[-1].state if self.special else self.points[-1].state
+        self._add("EP", None, before, last)
+        return True
 
     def _step(self, ds: float) -> tuple[Step, _Position]:
         """Return the next point, with its position."""
