@@ -6,6 +6,7 @@ chapter 8.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -133,6 +134,11 @@ class _ProbeCondition:
         return found
 
 
+def _slopes(value: Callable[[Array], float], curve: AnyCurve, w: Array) -> Array:
+    """Return the derivatives of a function of a point by all unknowns."""
+    return np.asarray(differences(lambda v: np.array([value(v)]), w, curve.scales(w))[0])
+
+
 class _BoundaryCondition:
     """An equilibrium lies on the boundary of its mode."""
 
@@ -143,7 +149,7 @@ class _BoundaryCondition:
         return singular_values_of(self.curve, w)[self.key]
 
     def gradient(self, w: Array) -> Array:
-        return np.asarray(differences(lambda v: np.array([self.value(v)]), w, self.curve.scales(w))[0])
+        return _slopes(self.value, self.curve, w)
 
     def beside(self, point: Step, tangent: Array) -> Tests:
         return singular_values_of(self.curve, point.w)
@@ -176,7 +182,7 @@ class _SpectralCondition:
         return singular_values_of(self.curve, w)[self.key]
 
     def gradient(self, w: Array) -> Array:
-        return np.asarray(differences(lambda v: np.array([self.value(v)]), w, self.curve.scales(w))[0])
+        return _slopes(self.value, self.curve, w)
 
     def beside(self, point: Step, tangent: Array) -> Tests:
         w, curve, values = point.w, self.curve, self._spectrum(point.w)

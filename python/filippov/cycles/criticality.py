@@ -28,6 +28,7 @@ Complex = npt.NDArray[np.complexfloating[Any, Any]]
 
 # Eigenvectors of the matrix and its transpose are at right angles where two eigenvalues meet.
 _DEFECTIVE = 1e-6
+# No displacement, in any number of coordinates.
 _HERE = np.zeros(1)
 # Differences over one, two and three widths.
 _WIDTH = 0.03
