@@ -175,9 +175,8 @@ class _CurveSide:
         if isinstance(curve, CycleCurve):
             probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
             found.update({p.key: p.value for p in probes})
-            if (
-                self.code in PROBES and self.code != "GR"
-            ):  # at an impact without speed the multipliers are infinite
+            # At an impact without speed the multipliers are infinite.
+            if self.code in PROBES and self.code != "GR":
                 found.update(singular_values_of(curve, w))
         found.update(condition.beside(point, tangent))
         return {
