@@ -72,3 +72,25 @@ def test_sliding_on_many_surfaces_ends_whatever_the_size_of_the_field(mass: floa
     assert [switch.kind for switch in run.switches] == ["exit_sliding"]
     assert abs(run.switches.t[0] - 2) < 1e-9
     np.testing.assert_allclose(mass * run.y[:, -1], [0, 0, 0, 0, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+def test_multipliers_may_move_far_within_one_step(rtol: float, method: str) -> None:
+    # On the intersection of three surfaces the state rests, so that only multipliers make a step too long.
+    def field(t: Any, x: Any) -> list[Any]:
+        a, b, c = np.sign(x[0] - 0.491 * x[1] ** 2), np.sign(x[2] - 0.008), np.sign(x[1] + 0.156)
+        push = 0.298 - 1.906 * np.sin(4.84 * t) - 1.215 * np.exp(-(x[1] ** 2))
+        return [
+            -2.855 * x[0] - 0.459 * x[1] + 1.105 * x[2] + push - 1.007 * a + 0.101 * b * a,
+            0.359 * t - 1.19 - 0.894 * x[1] + 0.76 * x[2]
+            + 0.929 * a - (1.206 + 0.3 * x[1] ** 2) * c + 1.038 * a * b,
+            0.099 - 0.076 * x[2] - 2.989 * b - 0.631 * c,
+        ]  # fmt: skip
+
+    start = [-0.128, 0.136, -1.314]
+    run = fl.solve_ivp(field, (0, 3), start, rtol=rtol, atol=1e-3 * rtol, method=method)
+    assert run.success, run.message
+    assert [str(switch.mode_after) for switch in run.switches][-3:] == ["000", "00-", "-0-"]
+    fine = fl.solve_ivp(field, (0, 3), start, max_step=0.01, **TIGHT)
+    np.testing.assert_allclose(run.y[:, -1], fine.y[:, -1], atol=100 * rtol)

@@ -357,6 +357,7 @@ impl<'a> Integrator<'a> {
             }
             self.stepper.accept(&mut self.run.x);
             self.run.t = t1;
+            self.run.motion.field.come_to(t1);
             if let Stiff::Warning(warning) = stiffness {
                 self.warnings.push(*warning);
             } else if let Stiff::GoOnImplicitly = stiffness {

@@ -183,6 +183,15 @@ impl ModeField<'_> {
         Ok(place.map_or(f64::NAN, |place| exits[place]))
     }
 
+    /// The motion has come to time t.
+    pub(crate) fn come_to(&mut self, t: f64) {
+        match self {
+            ModeField::Intersection(field) => field.come_to(t),
+            ModeField::Reduced(field) => field.inner.come_to(t),
+            _ => {}
+        }
+    }
+
     /// Takes over the discrete states that an action left.
     pub(crate) fn set_discrete(&mut self, q: &[f64]) {
         match self {

@@ -19,6 +19,9 @@ use crate::sparse::SparseRows;
 use crate::system::{OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{AT_SIDE, HELD_AFTER, MOST_MEETING, MOST_TRACKED};
 
+/// Multipliers with their time.
+type Dated = (f64, Vec<f64>);
+
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
 ///
@@ -47,8 +50,10 @@ pub struct IntersectionField<'a> {
     refused: Option<RuleFailure>,
     /// At the last evaluation; none where there is no root.
     lambda: Vec<f64>,
-    /// Those that were found lately, with their times: from the nearest ones the next are tracked.
-    tracked: Vec<(f64, Vec<f64>)>,
+    /// Those that the motion has come to, with their time; those it begins with, or none, at an endless one.
+    reached: Dated,
+    /// Those that were found beyond it: from the nearest of all these the next are tracked.
+    tracked: Vec<Dated>,
     exits: Vec<f64>,
     /// The times from and to which given multipliers hold: the equations vanish at the start.
     start: Option<([f64; 2], Vec<f64>)>,
@@ -96,7 +101,8 @@ impl<'a> IntersectionField<'a> {
             by_rule: None,
             refused: None,
             lambda: Vec::new(),
-            tracked: vec![(f64::INFINITY, lambda.to_vec())],
+            reached: (f64::INFINITY, lambda.to_vec()),
+            tracked: Vec::new(),
             exits: vec![f64::NAN; 2 * set.len() + 2],
             start: None,
             is_rootless: false,
@@ -219,7 +225,7 @@ impl<'a> IntersectionField<'a> {
     /// regularised motion goes around the root, so that it need not be stable.
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
         self.tracked.clear();
-        self.tracked.push((f64::INFINITY, lambda.to_vec()));
+        self.reached = (f64::INFINITY, lambda.to_vec());
         self.start = None;
         self.watch = RootWatch::new(oscillates);
         if let Some(law) = &mut self.affine {
@@ -234,8 +240,7 @@ impl<'a> IntersectionField<'a> {
             true => t + HELD_AFTER * (1.0 + t.abs()),
             false => t,
         };
-        let first = self.tracked.first();
-        self.start = first.map(|(_, lambda)| ([t, until], lambda.clone()));
+        self.start = Some(([t, until], self.reached.1.clone()));
     }
 
     /// Lets the multiplier of a guard go beyond its end by this much.
@@ -264,12 +269,21 @@ impl<'a> IntersectionField<'a> {
     /// The multipliers at the last evaluation, or if there are none those that were found nearest to time t.
     pub fn tracked(&self, t: f64) -> &[f64] {
         if self.lambda.is_empty() {
-            by_distance(&self.tracked, t)
-                .first()
-                .copied()
-                .unwrap_or(&[])
+            by_distance(&self.reached, &self.tracked, t)[0]
         } else {
             &self.lambda
+        }
+    }
+
+    /// The motion has come to time t: however far a step beyond it is tried, the next multipliers can be tracked from here.
+    pub(super) fn come_to(&mut self, t: f64) {
+        let mut found = std::mem::take(&mut self.tracked).into_iter();
+        let nearest = |near: Dated, next: Dated| match (next.0 - t).abs() <= (near.0 - t).abs() {
+            true => next,
+            false => near,
+        };
+        if let Some(first) = found.next() {
+            self.reached = found.fold(first, nearest);
         }
     }
 
@@ -348,7 +362,7 @@ impl<'a> IntersectionField<'a> {
                 self.n_evaluations +=
                     canopy.evaluate(self.system, &self.setting.at(t, x), self.units)?;
                 canopy.solve(
-                    &by_distance(&self.tracked, t),
+                    &by_distance(&self.reached, &self.tracked, t),
                     &mut self.watch,
                     dx,
                     self.patience,
@@ -423,9 +437,9 @@ impl<'a> IntersectionField<'a> {
 }
 
 /// The multipliers, those with the nearest times first; of several the last.
-fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
-    let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
-    let distance = |at: &&(f64, Vec<f64>)| (at.0 - t).abs();
+fn by_distance<'f>(reached: &'f Dated, tracked: &'f [Dated], t: f64) -> Vec<&'f [f64]> {
+    let mut all: Vec<&Dated> = tracked.iter().rev().chain([reached]).collect();
+    let distance = |at: &&Dated| (at.0 - t).abs();
     sort_few(&mut all, |a, b| distance(a).total_cmp(&distance(b)).is_lt());
     all.into_iter().map(|found| &found.1[..]).collect()
 }
