@@ -11,8 +11,8 @@ use crate::mode::Mode;
 use crate::motion::shares_of_rows;
 use crate::system::is_zero_within;
 use crate::tolerances::{
-    AT_SIDE, BEND_OF_CLINGING, CLOSE_TO_ROOT, HALVINGS_OF_CLINGING, MOST_CLINGING,
-    PIECES_OF_CLINGING, ROUNDING,
+    AT_SIDE, BEND_OF_CLINGING, CLOSE_TO_ROOT, MAX_DEPTH, MOST_CLINGING, PIECES_OF_CLINGING,
+    ROUNDING,
 };
 
 /// The way of a motion that is held to surfaces, as straight lines.
@@ -316,7 +316,7 @@ impl Roots<'_, '_, '_> {
         }
         // Of cubes, as the zero may be nearer by many powers of ten.
         (low, high) = (low.cbrt(), high.cbrt());
-        for _ in 0..HALVINGS_OF_CLINGING {
+        for _ in 0..MAX_DEPTH {
             let middle = 0.5 * (low + high);
             match rate(middle.powi(3))? > 0.0 {
                 true => low = middle,

@@ -8,7 +8,7 @@ use crate::mode::Mode;
 use crate::motion::{shares_of_rows, SmoothField};
 use crate::status::{Warning, WarningCode};
 use crate::system::{eval_on_side, is_zero_within};
-use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
+use crate::tolerances::{AT_SIDE, FEW_SURFACES, PLACES_BESIDE_REST, STEPS_INSIDE};
 
 /// Rest, where the motions of all modes lead back to the surfaces: tried at points beside them, as far as the tolerance and
 /// nearer. Multipliers keep the state where it is; or the point is isolated, the system does not depend on time, and no
@@ -19,7 +19,7 @@ pub(super) fn stay_if_nothing_leaves(
     meeting: &Meeting,
 ) -> Result<Option<Next>, FieldError> {
     let m = meeting.surfaces.len();
-    if !(2..=MOST_AROUND_REST).contains(&m) {
+    if !(2..=FEW_SURFACES).contains(&m) {
         return Ok(None);
     }
     for distance in PLACES_BESIDE_REST {
@@ -77,7 +77,7 @@ pub(crate) fn rest_within_tolerance(
     }
     let triggers = at.triggers();
     let is_trigger = |j: &usize| triggers.is_only_trigger(*j);
-    if !(2..=MOST_AROUND_REST).contains(&surfaces.len()) || surfaces.iter().any(is_trigger) {
+    if !(2..=FEW_SURFACES).contains(&surfaces.len()) || surfaces.iter().any(is_trigger) {
         return Ok(None);
     }
     let mut x = at.x.to_vec();
@@ -185,7 +185,7 @@ fn place_beside(
         }
     }
     let mut h = vec![0.0; signs.len()];
-    for _ in 0..STEPS_BESIDE_REST {
+    for _ in 0..STEPS_INSIDE {
         let place = at.place_at(at.t, &x, &signs);
         at.system.surfaces(&place, &mut h)?;
         let mut rows = Vec::with_capacity(n * meeting.surfaces.len());

@@ -7,7 +7,7 @@ use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::motion::{Guard, Leading, ModeField, SmoothField};
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, ROUNDING};
+use crate::tolerances::{AT_SIDE, MAX_LIE_ORDER, ROUNDING, TRIALS};
 
 /// Follows a motion for a moment, and longer until it is clear of rounding: of `noise` times its way.
 pub(super) fn try_mode(
@@ -28,18 +28,18 @@ pub(super) fn try_mode(
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
-    let mut moment = at.moment(notes, &next.mode.signs(), &velocity)?;
-    for _ in 0..=MOST_LENGTHENINGS {
-        match leaves_within(
+    let moment = at.moment(notes, &next.mode.signs(), &velocity)?;
+    for length in TRIALS {
+        let trial = leaves_within(
             at,
             notes,
             next,
             (&leaving, &ends),
             &velocity,
-            (moment, noise),
-        )? {
-            Trial::WithinRounding => moment *= LONGER_TRIAL,
-            trial => return Ok(trial),
+            (length * moment, noise),
+        )?;
+        if !matches!(trial, Trial::WithinRounding) {
+            return Ok(trial);
         }
     }
     Ok(Trial::WithinRounding)

@@ -86,8 +86,8 @@ pub const TURNS_BACK: f64 = 0.5;
 /// `EPS` times the size of the state; grown by 16 up to five times.
 pub const SIDE_OFFSET: f64 = 8.0;
 
-/// Most steps of Newton's method by which a point is moved into a region: from a distance like that of a stage behind a
-/// curved surface, each squares what is missing.
+/// Most steps of Newton's method by which a point is moved into a region, or beside an intersection: from a distance like that of a
+/// stage behind a curved surface, each squares what is missing.
 pub const STEPS_INSIDE: usize = 5;
 
 /// A point that was moved is where it was to go up to this share of the offset, which is near to rounding.

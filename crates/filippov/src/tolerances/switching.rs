@@ -118,14 +118,12 @@ pub const SPIRAL_START: f64 = 100.0;
 /// Switches in one turn of an accumulation at most: a turn around two surfaces has four.
 pub const LONGEST_TURN: usize = 32;
 
-/// Surfaces at whose intersection a motion may be found to rest, as all modes around it lead back: 3^m are tried.
-pub const MOST_AROUND_REST: usize = 3;
+/// Surfaces of which all 3^m modes are tried where a motion may rest, as all lead back, and whose multipliers are bounded over a step by
+/// m 2^m bounds: for more, samples cost less.
+pub const FEW_SURFACES: usize = 3;
 
 /// How far beside such an intersection the modes are tried, in units of the tolerance: at its edge, and well inside.
 pub const PLACES_BESIDE_REST: [f64; 2] = [1.0, 1e-3];
-
-/// Newton steps that look for such a place.
-pub const STEPS_BESIDE_REST: usize = 6;
 
 /// A motion that a root holds to a surface is followed there up to so many tolerances at most: it leaves beyond the first.
 pub const MOST_CLINGING: f64 = 4.0;
@@ -139,9 +137,6 @@ pub const BEND_OF_CLINGING: f64 = 0.25;
 
 /// Straight lines of one such motion at most.
 pub const PIECES_OF_CLINGING: usize = 10_000;
-
-/// Halvings that find where it is held.
-pub const HALVINGS_OF_CLINGING: usize = 52;
 
 /// Flights that shrink by this factor or more at a time end soon, whether the factors agree or not.
 pub const FAST_SHRINKING: f64 = 0.5;
@@ -161,9 +156,6 @@ pub const SAME_MEAN: f64 = 1e-3;
 /// The square of the distance from which accumulating switches are extrapolated is at least this part of that of the size of the
 /// states, also for a tolerance of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;
-
-/// Surfaces slid on whose multipliers are bounded over a step: for more, m 2^m bounds cost more than samples.
-pub const MOST_ENCLOSED: usize = 3;
 
 /// The multipliers are sought within these distances of their values at the ends of the step: the larger, the more
 /// they may move; the smaller, the nearer another root may be.
@@ -207,7 +199,6 @@ pub const INSIDE_SHARES: f64 = 0.05;
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
 
-/// A trial of the modes is lengthened by this factor, up to so many times, until every function is clear of rounding.
-pub const LONGER_TRIAL: f64 = 10.0;
-/// See [`LONGER_TRIAL`]: from a moment to about the time in which the state changes by its own size.
-pub const MOST_LENGTHENINGS: i32 = 3;
+/// Lengths of the trials of a mode, in moments, until every function is clear of rounding: the last is about the time in which the state
+/// changes by its own size.
+pub const TRIALS: [f64; 4] = [1.0, 1e1, 1e2, 1e3];

@@ -14,7 +14,7 @@ use crate::motion::{AffineBounds, Guard, KnownMultipliers, RootEnd, Seen};
 use crate::page::IS_PAGE;
 use crate::stepper::Interpolant;
 use crate::system::{PiecewiseSystem, Setting};
-use crate::tolerances::{EPS, MOST_ENCLOSED, ROOT_BOXES};
+use crate::tolerances::{EPS, FEW_SURFACES, ROOT_BOXES};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(crate) struct BoundedCurve<'a> {
@@ -74,7 +74,7 @@ impl BoundedCurve<'_> {
     /// An exit function of sliding on an intersection, from bounds of the multipliers.
     fn exit(&self, guard: Guard, a: f64, b: f64) -> Option<Bound> {
         let m = self.sliding.len();
-        if !self.by_multipliers || m > MOST_ENCLOSED && self.affine.is_none() {
+        if !self.by_multipliers || m > FEW_SURFACES && self.affine.is_none() {
             return None;
         }
         let mut known = self.known_roots.borrow_mut();
