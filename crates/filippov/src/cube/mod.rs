@@ -10,6 +10,7 @@ mod fold;
 mod lap;
 mod normal_fields;
 mod p_matrix;
+mod redundant;
 mod relay;
 mod roots;
 mod shared_load;
@@ -23,6 +24,7 @@ pub use lap::Lap;
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub(crate) use p_matrix::symmetrising_scale;
+pub use redundant::{Limit, Solutions};
 pub use relay::{solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution};
 pub use roots::{
     is_undetermined, least_multipliers, multiplier_rates, newton, roots_in_cube, stable_roots,

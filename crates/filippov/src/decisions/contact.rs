@@ -2,13 +2,13 @@
 
 use super::choice::choose;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point, Values};
-use super::trial::{try_mode, Trial};
+use super::trial::{largest_speed, try_mode, Trial};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ModeField, SmoothField};
 use crate::status::Stop;
-use crate::system::{dot, eval_on_side, surfaces_that_matter};
+use crate::system::{dot, surfaces_that_matter};
 use crate::tolerances::{AT_SIDE, MOST_MEETING, ROUNDING, VANISHING_GERM};
 
 /// An event while bodies are in contact, that triggers no action: a body leaves, or a surface of another kind
@@ -161,29 +161,6 @@ fn n_led_back(at: &Point, mode: &Mode, meeting: &[usize]) -> Result<usize, Field
         count += rates.iter().filter(|rate| *rate * side < 0.0).count();
     }
     Ok(count)
-}
-
-/// The largest speed beside these surfaces: forces that cancel on one side of a surface have their size on the other one.
-fn largest_speed(
-    at: &Point,
-    notes: &mut Notes,
-    mode: &Mode,
-    meeting: &[usize],
-    velocity: &[f64],
-) -> Result<f64, FieldError> {
-    let mut most = dot(velocity, velocity);
-    let mut beyond = vec![0.0; velocity.len()];
-    for &k in meeting.iter().filter(|&&k| mode.entries()[k] != 0) {
-        let signs = mode.with(k, -mode.entries()[k]).signs();
-        notes.n_field_evaluations += eval_on_side(at.system, &at.place(&signs), &mut beyond)?;
-        let square = dot(&beyond, &beyond);
-        most = if square.is_finite() {
-            most.max(square)
-        } else {
-            most
-        };
-    }
-    Ok(most.sqrt())
 }
 
 /// Do all guards of a mode begin positive? Forces, multipliers and the first derivatives of the functions that leave zero

@@ -5,8 +5,9 @@
 
 use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
+use crate::mode::Mode;
 use crate::motion::{Guard, Leading, ModeField, SmoothField};
-use crate::system::dot;
+use crate::system::{dot, eval_on_side};
 use crate::tolerances::{AT_SIDE, MAX_LIE_ORDER, ROUNDING, TRIALS};
 
 /// Follows a motion for a moment, and longer until it is clear of rounding: of `noise` times its way.
@@ -28,6 +29,7 @@ pub(super) fn try_mode(
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
+    let speed = largest_speed(at, notes, &next.mode, &leaving, &velocity)?;
     let moment = at.moment(notes, &next.mode.signs(), &velocity)?;
     for length in TRIALS {
         let trial = leaves_within(
@@ -35,7 +37,7 @@ pub(super) fn try_mode(
             notes,
             next,
             (&leaving, &ends),
-            &velocity,
+            (&velocity, speed),
             (length * moment, noise),
         )?;
         if !matches!(trial, Trial::WithinRounding) {
@@ -56,6 +58,29 @@ fn ends_reached(next: &Next) -> Vec<(usize, Guard)> {
     reached.map(|(place, (guard, _))| (place, guard)).collect()
 }
 
+/// The largest speed beside these surfaces: forces that cancel on one side of a surface have their size on the other one.
+pub(super) fn largest_speed(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    meeting: &[usize],
+    velocity: &[f64],
+) -> Result<f64, FieldError> {
+    let mut most = dot(velocity, velocity);
+    let mut beyond = vec![0.0; velocity.len()];
+    for &k in meeting.iter().filter(|&&k| mode.entries()[k] != 0) {
+        let signs = mode.with(k, -mode.entries()[k]).signs();
+        notes.n_field_evaluations += eval_on_side(at.system, &at.place(&signs), &mut beyond)?;
+        let square = dot(&beyond, &beyond);
+        most = if square.is_finite() {
+            most.max(square)
+        } else {
+            most
+        };
+    }
+    Ok(most.sqrt())
+}
+
 /// What becomes of a motion within a short time.
 pub(super) enum Trial {
     /// It leaves surfaces to the sides of its mode.
@@ -71,7 +96,7 @@ fn leaves_within(
     notes: &mut Notes,
     next: &Next,
     (leaving, ends): (&[usize], &[(usize, Guard)]),
-    velocity: &[f64],
+    (velocity, largest_speed): (&[f64], f64),
     (moment, noise_of_way): (f64, f64),
 ) -> Result<Trial, FieldError> {
     let mut values = [1.0, 0.5].map(|_| vec![0.0; leaving.len()]);
@@ -104,10 +129,14 @@ fn leaves_within(
             let value = h[j] - start[j];
             values[k] = value;
             at.system.gradient(j, &at.place(&signs), &mut gradient)?;
-            let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
+            let slope = dot(&gradient, &gradient).sqrt();
             // A root has no slope at the point.
-            let way = if way.is_finite() { way } else { 0.0 };
-            if value.abs() <= ROUNDING * size + noise_of_way * way + start[j].abs() {
+            let way = match slope.is_finite() {
+                true => slope * moment,
+                false => 0.0,
+            };
+            let rounding = ROUNDING * (size + largest_speed * way) + start[j].abs();
+            if value.abs() <= rounding + noise_of_way * dot(velocity, velocity).sqrt() * way {
                 is_clear = false;
             } else if value * f64::from(next.mode.entries()[j]) < 0.0 {
                 return Ok(Trial::Ends);

@@ -176,7 +176,7 @@ impl Instant<'_, '_> {
             passage.changes.push(entry);
             return Ok(Ok(passage));
         }
-        if record.guards.len() > 1 || self.passes_others_apart(&passage.time)? {
+        if self.passes_others_apart(&passage.time)? {
             return Ok(Err(Lost::OneSided));
         }
         let (map, mut moved) = self.mapped()?;
@@ -317,18 +317,38 @@ impl Instant<'_, '_> {
         Ok(found)
     }
 
-    /// Does a changed motion pass some of them at another time than this?
+    /// Does a changed motion, on the surfaces that this one keeps to, come to one of the others at another time than this?
     fn passes_others_apart(&mut self, time: &[f64]) -> Result<bool, FieldError> {
         let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
-        for j in self.passed_with_it()? {
-            let own = self.before.gradient_of(Guard::Surface(j), t, &z)?;
+        let passed = self.passed_with_it()?.into_iter().map(Guard::Surface);
+        let others: SmallVec<[Guard; 2]> = self
+            .record
+            .guards
+            .iter()
+            .skip(1)
+            .copied()
+            .chain(passed)
+            .collect();
+        if others.is_empty() {
+            return Ok(false);
+        }
+        let onto_surfaces = self.before.projection(&[], t, &z)?;
+        for guard in others {
+            if !matches!(guard, Guard::Surface(_)) || !self.record.acts.is_empty() {
+                return Ok(true);
+            }
+            let own = self.before.gradient_of(guard, t, &z)?;
             let rate = own.time + dot(&own.state, self.record.field[0]);
             let size = own
                 .state
                 .iter()
                 .fold(rate.abs(), |most, g| most.max(g.abs()));
-            let mut entries = own.state.iter().zip(time);
-            if entries.any(|(g, time)| (g + rate * time).abs() > AT_SIDE * size) {
+            let entries = own.state.iter().zip(time);
+            let mut apart: Vec<f64> = entries.map(|(g, time)| g + rate * time).collect();
+            if let Some(onto_surfaces) = &onto_surfaces {
+                onto_surfaces.pull_back(self.extended.n, &mut apart);
+            }
+            if apart.iter().any(|entry| entry.abs() > AT_SIDE * size) {
                 return Ok(true);
             }
         }

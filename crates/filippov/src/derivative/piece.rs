@@ -9,6 +9,7 @@ use super::change::{Change, Row, Rows};
 use super::collocation::{fastest, operations, Collocation};
 use super::extended::Extended;
 use super::forms::{add, form_by_differences, is_known, pairs, Moved, Second};
+use super::orthonormal::{orthonormal, Choice};
 use super::radau::{INTEGRALS, NODES, STAGES};
 use super::series::{Carried, ChangeSeries, Changes};
 use crate::cube::{Matrix, Vector};
@@ -734,12 +735,29 @@ impl<'a> Piece<'a> {
             .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
+        let normals = independent(normals, n);
         let directions = normals
             .iter()
             .map(|row| Row::from_slice(&row[..n]))
             .collect();
         Ok((!normals.is_empty()).then(|| Change::normal_to(normals, directions)))
     }
+}
+
+/// Rows without those that follow from the ones before, by their first n entries.
+fn independent(rows: Rows, n: usize) -> Rows {
+    let unit = |row: &Row| {
+        let length = dot(&row[..n], &row[..n]).sqrt();
+        row[..n].iter().map(|v| v / length).collect()
+    };
+    let units: Vec<Vec<f64>> = rows.iter().map(unit).collect();
+    let choice = Choice {
+        in_order: units.len(),
+        most: units.len(),
+        size: Some(1.0),
+    };
+    let telling = orthonormal(&units, n, choice).order;
+    telling.into_iter().map(|i| rows[i].clone()).collect()
 }
 
 /// Is the field affine in the signs of these surfaces?

@@ -320,6 +320,7 @@ impl<'a> Integrator<'a> {
         self.run.stats.n_steps_sliding += u64::from(sliding);
         self.stepper.count(&mut self.run.stats);
         self.control.accept(&self.stepper, dt, error);
+        self.control.limit(self.run.longest_by_exits(dt));
         if self.control.is_short(dt, self.horizon - self.run.t) {
             // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
             // two-fold the multiplier is a quotient of small numbers.

@@ -5,12 +5,12 @@ use smallvec::SmallVec;
 
 use super::guard::Guards;
 use super::{Guard, Motion, SmoothField};
-use crate::cube::{is_scaling_stable, Matrix};
+use crate::cube::{is_scaling_stable, Limit, Matrix, Solutions, Vector};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::Actions;
 use crate::system::{dot, eval_on_side, OwnSetting, PiecewiseSystem, Setting};
-use crate::tolerances::{DOUBTFUL, ROUNDING, VANISHING_GERM};
+use crate::tolerances::{DEFINITE_PIVOT, DOUBTFUL, ROUNDING, VANISHING_GERM};
 
 /// The field of contact,
 ///
@@ -21,7 +21,8 @@ use crate::tolerances::{DOUBTFUL, ROUNDING, VANISHING_GERM};
 /// linear system. One contact alone gives f_s = f - (L_f^2 h / L_W L_f h) W.
 ///
 /// Contact c lasts while nu_c > 0 (it pushes and does not pull), sliding while lambda_k = 2 mu_k - 1 lies in [-r, r],
-/// r the ratio of static to kinetic friction, 1 for a Filippov system.
+/// r the ratio of static to kinetic friction, 1 for a Filippov system. Where some of the equations follow from others (bodies at rest that
+/// are pressed together, each with friction) the multipliers that are not determined end together, when no choice of them is admissible.
 #[derive(Clone)]
 pub struct ContactField<'a> {
     system: &'a dyn PiecewiseSystem,
@@ -92,7 +93,7 @@ impl<'a> ContactField<'a> {
 
     /// The surfaces in contact with the accelerations nu that hold the bodies, at the last evaluation.
     pub fn accelerations(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let held = self.contacts().zip(&self.exits);
+        let held = self.contacts().zip(&self.multipliers);
         held.map(|(j, nu)| (j, *nu))
     }
 
@@ -106,24 +107,65 @@ impl<'a> ContactField<'a> {
 
     /// Do the fields around the surfaces slid on lead to them, with the forces of the contacts?
     pub fn attracts(&self) -> bool {
-        let (n, m) = (self.contacts.len(), self.sliding.len());
-        if m == 0 {
-            return true;
-        }
-        let closed = self.coupling.principal(&(0..n).collect::<Vec<_>>());
-        let mut rates = Matrix::zeros(m);
-        for k in 0..m {
-            let column: Vec<f64> = (0..n).map(|c| self.coupling[(c, n + k)]).collect();
-            let Some(forces) = closed.solve(&column) else {
-                return false;
-            };
-            for i in 0..m {
-                let of_forces = forces.iter().enumerate();
-                let of_forces = of_forces.map(|(c, force)| self.coupling[(n + i, c)] * force);
-                rates[(i, k)] = self.coupling[(n + i, n + k)] - of_forces.sum::<f64>();
+        // What follows from others is held with them.
+        let mut telling = Vec::new();
+        for i in 0..self.coupling.n() {
+            telling.push(i);
+            if !is_regular(&self.coupling.principal(&telling)) {
+                telling.pop();
             }
         }
-        is_scaling_stable(&rates)
+        let (contacts, sliding): (Vec<usize>, Vec<usize>) =
+            telling.iter().partition(|&&i| i < self.contacts.len());
+        let closed = self.coupling.principal(&contacts);
+        let mut rates = Matrix::zeros(sliding.len());
+        for (k, &column) in sliding.iter().enumerate() {
+            let by_sign: Vec<f64> = contacts
+                .iter()
+                .map(|&c| self.coupling[(c, column)])
+                .collect();
+            let Some(forces) = closed.solve(&by_sign) else {
+                return false;
+            };
+            for (i, &row) in sliding.iter().enumerate() {
+                let of_forces = contacts.iter().zip(&forces);
+                let of_forces = of_forces.map(|(&c, force)| self.coupling[(row, c)] * force);
+                rates[(i, k)] = self.coupling[(row, column)] - of_forces.sum::<f64>();
+            }
+        }
+        sliding.is_empty() || is_scaling_stable(&rates)
+    }
+
+    /// The multipliers, from their equations; where these do not determine them, those with the largest reserves. None where there are
+    /// no solutions, or where they give several motions.
+    fn solve(&self, rates: &[f64], directions: &[Vec<f64>]) -> Option<Vector> {
+        match Solutions::of(&self.coupling, rates) {
+            Some(solutions) if !solutions.directions.is_empty() => {
+                let is_one = moves_nothing(&solutions, directions);
+                is_one.then(|| solutions.most_reserved(&self.limits()))?
+            }
+            _ => self.coupling.solve(rates),
+        }
+    }
+
+    /// The limits of the multipliers: a force is measured by the accelerations around.
+    fn limits(&self) -> Vec<Limit> {
+        let n = self.contacts.len();
+        let force = |(multiplier, noise): (usize, &f64)| Limit {
+            multiplier,
+            factor: VANISHING_GERM / noise.max(f64::MIN_POSITIVE),
+            constant: 0.0,
+        };
+        let forces = self.noise.iter().enumerate().map(force);
+        // r + lambda and r - lambda, lambda = 2 mu - 1.
+        let signs = self.ratios.iter().enumerate().flat_map(|(k, r)| {
+            [(2.0, r - 1.0), (-2.0, r + 1.0)].map(|(factor, constant)| Limit {
+                multiplier: n + k,
+                factor,
+                constant,
+            })
+        });
+        forces.chain(signs).collect()
     }
 
     /// The directions W, in units of the acceleration that they give on the free side; NaN where the map has no
@@ -202,6 +244,29 @@ fn gram(rows: &[Vec<f64>], directions: &[Vec<f64>]) -> Matrix {
         }
     }
     matrix
+}
+
+/// Have the equations of this matrix one solution each?
+fn is_regular(matrix: &Matrix) -> bool {
+    let solutions = Solutions::of(matrix, &Vector::from_elem(0.0, matrix.n()));
+    solutions.is_some_and(|solutions| solutions.directions.is_empty())
+}
+
+/// Do all solutions give the same motion?
+fn moves_nothing(solutions: &Solutions, of_multipliers: &[Vec<f64>]) -> bool {
+    let n_states = of_multipliers.first().map_or(0, Vec::len);
+    solutions.directions.iter().all(|direction| {
+        (0..n_states).all(|i| {
+            let terms = direction
+                .iter()
+                .zip(of_multipliers)
+                .map(|(d, of)| d * of[i]);
+            let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), term| {
+                (sum + term, size + term.abs())
+            });
+            sum.abs() <= DEFINITE_PIVOT.sqrt() * size
+        })
+    })
 }
 
 impl Motion for ContactField<'_> {
@@ -292,7 +357,7 @@ impl SmoothField for ContactField<'_> {
             .map(|&j| self.system.stick_ratio(j, &self.setting.at(t, x)))
             .collect();
         self.coupling = gram(&rows, &directions);
-        self.multipliers = match self.coupling.solve(&rates) {
+        self.multipliers = match self.solve(&rates, &directions) {
             Some(found) => found.into_vec(),
             None => vec![f64::NAN; rows.len()],
         };

@@ -9,7 +9,7 @@ use crate::mode::Mode;
 use crate::options::Options;
 use crate::stats::Stats;
 use crate::system::{Actions, AffineParts, PiecewiseSystem};
-use crate::tolerances::SMALL_JUMP;
+use crate::tolerances::{SMALL_JUMP, STAGE_SPREAD};
 
 /// A run: its problem, the place that it has reached, the motion from there, and what was counted.
 ///
@@ -68,6 +68,24 @@ impl<'a> Run<'a> {
             space: RefCell::default(),
             stats: Stats::default(),
         }
+    }
+
+    /// Does something beside its values tell where an exit function of the motion is positive? There is none in a region.
+    pub fn bounds_exits(&self) -> bool {
+        let motion = &self.motion;
+        motion.sliding().is_empty()
+            || motion.has_bounds() && !motion.slides_by_rule() && self.system.enclosures().is_some()
+    }
+
+    /// How long the step after one of length `dt` may be. A state at rest allows any, however the load on it varies: where only values
+    /// of exit functions are known, they may not change by more than [`STAGE_SPREAD`] of their size.
+    pub fn longest_by_exits(&self, dt: f64) -> f64 {
+        if self.bounds_exits() {
+            return f64::INFINITY;
+        }
+        let change = |seen: &Seen| (seen.range[1] - seen.range[0]) / seen.size();
+        let most = self.seen.iter().map(change).fold(0.0, f64::max);
+        dt * STAGE_SPREAD / most
     }
 
     /// While sliding on one surface: is the difference of the normal components at an end of the step so small, compared with

@@ -106,6 +106,7 @@ impl StepControl {
             // The series tells.
             return Ok(longest);
         }
+        let bounds_exits = at.bounds_exits();
         let (t, x, scale, field) = (at.t, &at.x, &at.scale, &mut at.motion.field);
         let derivative = steppers.start_derivative();
         let mode = &at.motion.mode;
@@ -114,7 +115,8 @@ impl StepControl {
         let pace = self.paces.first_step(mode, x, derivative, scale);
         let mut dt = match pace.filter(is_step) {
             Some(dt) => dt.min(longest),
-            None if is_step(&self.dt) => {
+            // Steps become as long as exit functions allow only one by one.
+            None if is_step(&self.dt) && bounds_exits => {
                 restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
             }
             None => initial_step(field, t, x, derivative, scale, longest)?,
