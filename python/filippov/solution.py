@@ -780,8 +780,18 @@ class Solution:
         indices = np.searchsorted(forward * starts, forward * times, side="right") - 1
         return [modes[index] for index in indices]
 
+    def _modes_of_points(self) -> list[Mode] | None:
+        """Return the modes at `t`; None without surfaces, and if pieces of the run were forgotten."""
+        if not self.surfaces or not len(self.segments):
+            return None
+        span = np.abs(self.segments[-1].t_end - self.segments.t_start[0])
+        is_whole = np.all(np.abs(self.t - self.segments[-1].t_end) <= span)
+        return self._modes_at(self.t) if is_whole else None
+
     def to_pandas(self) -> Any:
-        """Return a `pandas.DataFrame`, indexed by time, with one column per state and the mode as text.
+        """Return a `pandas.DataFrame`, indexed by time, with one column per state, discrete state and output.
+
+        The mode stands beside them as text, unless ``keep="last"`` has forgotten it.
 
         Raises
         ------
@@ -792,8 +802,9 @@ class Solution:
         columns: dict[str, Any] = {name: self.y[i] for i, name in enumerate(self.states)}
         columns.update(self.discrete)
         columns.update(self.outputs)
-        if self.surfaces and len(self.segments):
-            columns["mode"] = [str(mode) for mode in self._modes_at(self.t)]
+        modes = self._modes_of_points()
+        if modes is not None:
+            columns["mode"] = [str(mode) for mode in modes]
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
 
     def to_xarray(self) -> Any:
@@ -813,8 +824,9 @@ class Solution:
         xarray = import_xarray()
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
         variables.update((name, ("t", values)) for name, values in {**self.discrete, **self.outputs}.items())
-        if self.surfaces and len(self.segments):
-            variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
+        modes = self._modes_of_points()
+        if modes is not None:
+            variables["mode"] = ("t", as_texts(modes))
         coords: dict[str, Any] = {"t": self.t}
         if self.wrt and isinstance(self._run, Run) and self.sol is not None:
             taken = {"derivative", "state", "wrt"}.intersection(variables)

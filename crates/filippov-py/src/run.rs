@@ -384,7 +384,7 @@ impl Run {
         dict.set_item("n_steps_sliding", stats.n_steps_sliding)?;
         dict.set_item("n_rejected_sliding", stats.n_rejected_sliding)?;
         dict.set_item("n_extensions", stats.n_extensions)?;
-        dict.set_item("n_events", stats.n_switches)?;
+        dict.set_item("n_events", stats.n_events)?;
         Ok(dict)
     }
 
@@ -686,7 +686,14 @@ impl Run {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let solution = self.solution();
         let mut out = Vec::new();
-        for &t in t.as_slice()? {
+        let (times, at_t) = (t.as_slice()?, &solution.discrete_at_t);
+        let width = at_t.len() / solution.t.len().max(1);
+        if width > 0 && *times == solution.t[..] {
+            let rows = at_t.chunks_exact(width);
+            rows.for_each(|row| out.extend_from_slice(&row[..n]));
+            return Ok(columns(py, &out, n));
+        }
+        for &t in times {
             let segment = solution.segment_at(t, side_of(left));
             let of_segment = segment.map(|segment| segment.discrete);
             let states = of_segment.as_ref().unwrap_or(&solution.discrete);

@@ -29,7 +29,9 @@ pub struct Stats {
     pub n_rejected_sliding: u64,
     /// Continuous extensions of order 5 that were computed.
     pub n_extensions: u64,
-    /// Switches.
+    /// Events and actions: `max_events` bounds their number.
+    pub n_events: u64,
+    /// Switches that were recorded.
     pub n_switches: u64,
     /// Those in the place where the run ended, one after the other, if they are very many; else 0.
     pub n_switches_here: u64,
@@ -58,6 +60,7 @@ impl Stats {
             n_steps_sliding,
             n_rejected_sliding,
             n_extensions,
+            n_events,
             n_switches,
             n_switches_here,
             here_since: _,
@@ -72,6 +75,7 @@ impl Stats {
             n_steps_sliding,
             n_rejected_sliding,
             n_extensions,
+            n_events,
             n_switches,
             n_switches_here,
         ];

@@ -70,7 +70,7 @@ impl<'r> Differentiated<'r> {
         let Some(columns) = self.columns(t, side)? else {
             return Ok(None);
         };
-        let (path, extended) = (self.path(side), self.run.systems.1);
+        let (path, extended) = (self.path(t, side), self.run.systems.1);
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
@@ -107,7 +107,7 @@ impl<'r> Differentiated<'r> {
         let mut second = Second {
             pairs: known.chunks_exact(n).map(<[f64]>::to_vec).collect(),
         };
-        let path = self.path(side);
+        let path = self.path(t, side);
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
@@ -144,10 +144,17 @@ impl<'r> Differentiated<'r> {
             .collect()
     }
 
-    /// The path of the run.
-    fn path(&self, side: Side) -> impl Fn(f64, &mut [f64]) -> Result<(), FieldError> + Copy + 'r {
+    /// The path of the run to a time, which is reached from this side: the motion to it starts behind an instant.
+    fn path(
+        &self,
+        end: f64,
+        side: Side,
+    ) -> impl Fn(f64, &mut [f64]) -> Result<(), FieldError> + Copy + 'r {
         let (solution, systems) = (self.run.solution, self.run.systems);
-        move |t: f64, x: &mut [f64]| state_at(solution, systems, (t, side), x)
+        move |t: f64, x: &mut [f64]| {
+            let side = if t < end { Side::Right } else { side };
+            state_at(solution, systems, (t, side), x)
+        }
     }
 
     /// The derivative of the state, with the shares of the parameters behind each column.
@@ -160,7 +167,7 @@ impl<'r> Differentiated<'r> {
         if start == t {
             return Ok(Some(columns));
         }
-        let (path, extended) = (self.path(side), self.run.systems.1);
+        let (path, extended) = (self.path(t, side), self.run.systems.1);
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };

@@ -184,7 +184,7 @@ impl<'a> Integrator<'a> {
         if attempts >= self.run.options.max_steps {
             return Ok(Some(Stop::MaxSteps));
         }
-        if self.run.stats.n_switches >= self.run.options.max_events {
+        if self.run.stats.n_events >= self.run.options.max_events {
             return Ok(Some(Stop::MaxEvents));
         }
         self.watch.look(attempts, self.progress.reached(self.run.t));

@@ -102,8 +102,8 @@ impl<'a> Integrator<'a> {
 
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
-        self.run.stats.n_switches += 1;
-        if self.run.stats.n_switches >= FEW_SWITCHES {
+        self.run.stats.n_events += 1;
+        if self.run.stats.n_events >= FEW_SWITCHES {
             let (run, before) = (&self.run, self.recorder.switches());
             self.progress.note_place(run.t, &run.x, before, &run.scale);
         }
@@ -296,7 +296,7 @@ impl<'a> Integrator<'a> {
         self.run.x = x;
         self.recorder.jump(self.run.t, &self.run.x);
         self.recorder.user_events.forget_sides();
-        self.run.stats.n_switches += 1;
+        self.run.stats.n_events += 1;
         self.recorder.switch(Switch {
             t: self.run.t,
             y_before,
@@ -823,7 +823,7 @@ impl<'a> Integrator<'a> {
         if let Some(observed) = &mut self.recorder.observed {
             observed.act(derivative, acts);
         }
-        self.run.stats.n_switches += done.len() as u64;
+        self.run.stats.n_events += done.len() as u64;
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));
         self.recorder.jump(t, &self.run.x);
@@ -858,7 +858,7 @@ impl<'a> Integrator<'a> {
             self.recorder.jump(self.run.t, &self.run.x);
             self.recorder.user_events.forget_sides();
         }
-        self.run.stats.n_switches += 1;
+        self.run.stats.n_events += 1;
         let passed = match surfaces[..] {
             [surface] if is_rest => self.ask(Cause::Start, |at, notes| {
                 passed_beside(at, notes, &before, surface)

@@ -122,6 +122,7 @@ impl EndOnly {
             units: Vec::new(),
             mode: self.mode.clone(),
             discrete: Vec::new(),
+            discrete_at_t: Vec::new(),
             sides: Vec::new(),
             stats,
             warnings: Vec::new(),

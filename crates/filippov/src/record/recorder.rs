@@ -40,11 +40,15 @@ pub(crate) struct Recorder<'a> {
     t: Vec<f64>,
     y: Vec<f64>,
     y0: Vec<f64>,
+    /// The discrete states at `t`, where times are sampled and pieces forgotten.
+    discrete_at_t: Vec<f64>,
     keep_dense: bool,
     steps: Vec<Step>,
     coefficients: Vec<f64>,
     segments: Segments,
     switches: Switches,
+    /// Those that were recorded, also the ones forgotten since.
+    n_switches: u64,
     /// How often the last of them, a touch, was repeated without any progress of time.
     n_repeated: usize,
     /// The last jump of the state.
@@ -74,11 +78,13 @@ impl<'a> Recorder<'a> {
             t: Vec::with_capacity(room),
             y: Vec::with_capacity(room * n),
             y0: vec![0.0; n],
+            discrete_at_t: Vec::new(),
             keep_dense,
             steps: Vec::new(),
             coefficients: Vec::new(),
             segments: Segments::with_capacity(room),
             switches: Switches::with_capacity(room),
+            n_switches: 0,
             n_repeated: 0,
             jump: None,
             is_sampled: wanted.is_some(),
@@ -104,11 +110,13 @@ impl<'a> Recorder<'a> {
             t: Vec::new(),
             y: Vec::new(),
             y0: vec![0.0; self.n],
+            discrete_at_t: Vec::new(),
             keep_dense: self.keep_dense,
             steps: Vec::new(),
             coefficients: Vec::new(),
             segments: Segments::default(),
             switches,
+            n_switches: 0,
             n_repeated: self.n_repeated,
             jump: self.jump.clone(),
             wanted: self.wanted.clone(),
@@ -230,6 +238,11 @@ impl<'a> Recorder<'a> {
         let t = self.wanted[self.next];
         self.next += 1;
         self.push(t, y);
+        if self.keep == Keep::Last {
+            if let Some(piece) = self.segments.latest().last() {
+                self.discrete_at_t.extend(&piece.discrete);
+            }
+        }
     }
 
     /// The state just recorded has jumped: the limit from the right is kept.
@@ -432,6 +445,7 @@ impl<'a> Recorder<'a> {
             visits.switched(&switch);
         }
         self.n_repeated = 0;
+        self.n_switches += 1;
         self.switches.push(switch);
     }
 
@@ -514,9 +528,10 @@ impl<'a> Recorder<'a> {
         (t_last, x, options): (f64, &[f64], &Options),
         (mode, discrete, sides): (Mode, Vec<f64>, Vec<i8>),
         stop: Stop,
-        stats: Stats,
+        mut stats: Stats,
         warnings: Vec<Warning>,
     ) -> Solution {
+        stats.n_switches = self.n_switches;
         self.close_segment(t_last);
         let jump = self.jump.take().filter(|(t, _)| *t == t_last);
         if self.is_sampled {
@@ -558,6 +573,7 @@ impl<'a> Recorder<'a> {
             units: Units::from(options).parts(self.n),
             mode,
             discrete,
+            discrete_at_t: self.discrete_at_t,
             sides,
             stats,
             warnings,

@@ -64,6 +64,8 @@ pub struct Solution {
     pub mode: Mode,
     /// The discrete states at the end.
     pub discrete: Vec<f64>,
+    /// Those at each of `t`, one after the other, where pieces are forgotten and `t` is `t_eval`; else empty.
+    pub discrete_at_t: Vec<f64>,
     /// The side of each surface on which the motion was last, if the run has actions.
     pub(crate) sides: Vec<i8>,
     /// Counters.
