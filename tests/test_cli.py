@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -28,6 +29,38 @@ def test_solve_writes_every_digit(model: Path, capsys: pytest.CaptureFixture[str
     assert "F=0.5, omega=0.333333333333" in printed
     assert f"{len(expected.switches)} switches" in printed
     assert f"y={expected.y[0, -1]:.12g}" in printed
+
+
+def test_tables_have_the_discrete_states(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (
+        "import filippov as fl\n"
+        "s = fl.System(lambda t, x, u: [x[1], u], n=2, states=('h', 'v'), discrete={'u': 0.2},\n"
+        "    resets=fl.Reset(period=0.1, set={'u': lambda t, x, u: -1.5 * x[0] - x[1]}))\n"
+        "y0, t_span = [1.0, 0.0], (0, 3)\n"
+    )
+    model.write_text(text)
+    assert main(["solve", "model.py", "--csv", "out.csv", "--json", "out.json", "--quiet"]) == 0
+    names: dict[str, Any] = {}
+    exec(text, names)
+    expected = names["s"].solve((0, 3), [1.0, 0.0]).discrete["u"].tolist()
+    assert [float(row["u"]) for row in rows(model.parent / "out.csv")] == expected
+    assert json.loads((model.parent / "out.json").read_text())["discrete"]["u"] == expected
+
+
+@pytest.mark.parametrize("period", ["1/0", "2*pi/0", "9**9**9", "(0-8)**0.5", "1e400"])
+def test_a_period_without_a_value_is_one_line(
+    period: str, model: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--param", "omega=0.2,0.3", "--period", period]
+    assert main(["sweep", "model.py", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("span", ["5", "(1, 2, 3)"])
+def test_a_span_of_a_file_has_two_ends(span: str, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model.write_text(f"{MODEL}t_span = {span}\n")
+    assert main(["solve", "model.py"]) == 2
+    assert capsys.readouterr().err.startswith("filippov: t_span of the file: start and end are needed")
 
 
 def test_states_by_name_and_points(model: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -99,3 +99,14 @@ def test_many_runs_and_second_derivatives() -> None:
         for d in (1e-5, -1e-5)
     )
     np.testing.assert_allclose(second[:, 1], (above - below) / 2e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_both_sides_agree_between_resets(order: int) -> None:
+    system = sampled()
+    run = system.solve((0, 2), [1.0, 0.0], wrt=["k"], order=order, **TIGHT)
+    times = [0.2, 0.4, 0.75, 1.3, 1.9]
+    left, right = (run.derivative(times, side=side, order=order) for side in ("left", "right"))
+    np.testing.assert_allclose(left, right, atol=1e-12)
+    before = run.derivative(0.6 - 1e-9, order=order)
+    np.testing.assert_allclose(run.derivative(0.6, side="left", order=order), before, atol=1e-7)

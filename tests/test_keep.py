@@ -117,3 +117,29 @@ def test_memory_does_not_grow_with_the_run() -> None:
 def test_unknown_policy_is_refused() -> None:
     with pytest.raises(fl.InputError, match=r"^keep:.*'steps', 'switches', 'last'|^keep:"):
         fl.solve_ivp(oscillator, (0, 1), START, keep="nothing")
+
+
+@pytest.mark.parametrize("keep", ["steps", "switches", "last"])
+def test_discrete_states_at_wanted_times(keep: Any, tmp_path: Path) -> None:
+    counted = fl.Reset(period=0.5, set={"u": lambda t, x, u: u + 1})
+    system = fl.System(lambda t, x, u: [u - x[0]], n=1, discrete={"u": 0.0}, resets=counted)
+    times = [0.3, 0.5, 0.8, 1.2, 1.7, 2.2]
+    run = system.solve((0, 2.2), [1.0], t_eval=times, keep=keep)
+    expected = [1, 2, 2, 3, 4, 5]
+    np.testing.assert_array_equal(run.state("u"), expected)
+    np.testing.assert_array_equal(run.to_pandas()["u"], expected)
+    run.save(tmp_path / "run.npz")
+    np.testing.assert_array_equal(fl.load(tmp_path / "run.npz").discrete["u"], expected)
+    many = system.ensemble((0, 2.2), [[1.0], [2.0]], t_eval=times, keep=keep)
+    np.testing.assert_array_equal(many[1].discrete["u"], expected)
+
+
+def test_tables_of_a_run_whose_modes_were_forgotten() -> None:
+    run = fl.solve_ivp(oscillator, (0, 20), START, t_eval=[0, 5, 20], keep="last")
+    whole = fl.solve_ivp(oscillator, (0, 20), START, t_eval=[0, 5, 20])
+    assert [*run.to_pandas()] == ["x[0]", "x[1]"]
+    assert "mode" not in run.to_xarray()
+    pytest.importorskip("pandas").testing.assert_frame_equal(
+        run.to_pandas(), whole.to_pandas()[["x[0]", "x[1]"]]
+    )
+    assert fl.solve_ivp(oscillator, (0, 20), START, keep="last").to_pandas()["mode"].size == 1

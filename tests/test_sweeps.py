@@ -431,3 +431,14 @@ def test_wrong_moduli_of_basins_without_a_section_are_named() -> None:
         fl.basins(pendulum, None, (0, 80), starts, modulo={"th": 0})
     found = fl.basins(pendulum, None, (0, 80), starts, modulo={"th": 2 * np.pi})
     assert found.attractor.values.tolist() == [0, 0, 0]
+
+
+def test_a_sweep_counts_the_switches_of_its_runs(friction: fl.System) -> None:
+    bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.9 * x[1]])
+    ball = fl.System(lambda t, x, g=9.81: [x[1], -g], n=2, resets=bounce)
+    relay = fl.System(lambda t, x, a=1.0: [-a * (x[0] + fl.hysteresis(x[0], -0.5, 0.5))], n=1)
+    starts: list[tuple[fl.System, list[float]]] = [(ball, [1, 0]), (relay, [0]), (friction, [1, 2])]
+    for system, start in starts:
+        run = system.solve((0, 7), start)
+        assert len(run.switches) > 2
+        assert fl.sweep(system, (0, 7), [start]).n_switches.values == len(run.switches)

@@ -232,7 +232,7 @@ export class DiagramPanel extends WorkPanel {
   private request(values: readonly number[], start?: Start): Request {
     const { state } = this.context;
     const [from, to] = longSpan(state);
-    const { t, y } = start ?? { t: from, y: state.y0 };
+    const { t, y, memory } = start ?? ({ t: from, y: state.y0 } as Start);
     return {
       kind: "diagram",
       ...motionRequest(state),
@@ -245,6 +245,7 @@ export class DiagramPanel extends WorkPanel {
       values,
       coordinate: state.coordinate,
       carry: state.carry,
+      ...(memory && { memory }),
     };
   }
 

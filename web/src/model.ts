@@ -14,6 +14,9 @@ export interface Page {
   readonly axes: readonly [number, number] | null;
   readonly text: string | null;
   readonly reference: string | null;
+  /** What the system is in the text: the name of its function, or of a system that the text makes. */
+  readonly function: string | null;
+  readonly object: string | null;
 }
 
 export interface Description {
@@ -72,6 +75,8 @@ const NO_PAGE: Page = {
   axes: null,
   text: null,
   reference: null,
+  function: null,
+  object: null,
 };
 
 export async function describe(engine: Engine): Promise<Description> {

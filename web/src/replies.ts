@@ -83,7 +83,7 @@ export interface Returns {
 export interface DiagramPart {
   readonly value: Float64Array;
   readonly y: Float64Array;
-  readonly end: { readonly t: number; readonly y: readonly number[] } | null;
+  readonly end: { readonly t: number; readonly y: readonly number[]; readonly memory?: readonly number[] } | null;
   readonly failures: readonly { readonly value: number; readonly message: string }[];
 }
 
@@ -165,10 +165,11 @@ export function toReturns(reply: Reply): Returns {
 }
 
 export function toDiagramPart(reply: Reply): DiagramPart {
+  const memory = reply.has("memory") && { memory: [...reply.table("memory").data] };
   return {
     value: reply.table("value").data,
     y: reply.table("y").data,
-    end: reply.has("end") ? { t: Number(reply.header.t), y: [...reply.table("end").data] } : null,
+    end: reply.has("end") ? { t: Number(reply.header.t), y: [...reply.table("end").data], ...memory } : null,
     failures: (reply.header.messages ?? []) as DiagramPart["failures"],
   };
 }

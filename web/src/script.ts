@@ -1,9 +1,15 @@
 /** A Python script that repeats the run on the screen: letter for letter that of `filippov.app.write_script`. */
 
-import type { Description, State } from "./model.ts";
+import type { Description, Page, State } from "./model.ts";
 import { toBase64 } from "./share.ts";
 
 const LINE = 96;
+const IMPORTS = {
+  math: "import math",
+  numpy: "import numpy",
+  np: "import numpy as np",
+  fl: "import filippov as fl",
+};
 
 /** The script; `model` are the bytes that the page was given, for systems without text or name. */
 export function writeScript(description: Description, state: State, model: Uint8Array): string {
@@ -12,27 +18,23 @@ export function writeScript(description: Description, state: State, model: Uint8
   const options = [`rtol=${python(state.rtol)}`, `atol=${python(state.atol)}`];
   if (state.method !== "auto") options.push(`method=${quoted(state.method)}`);
   const span = `(${state.t_span.map(python).join(", ")})`;
-  const picture = page.axes ? `phase(sol, ${page.axes.map((k) => quoted(states[k])).join(", ")})` : "time_series(sol)";
+  const [system, y0, values, sol] = ["system", "y0", "params", "sol"].map((name) => free(name, page));
+  const picture = page.axes ? `phase(${sol}, ${page.axes.map((k) => quoted(states[k])).join(", ")})` : `time_series(${sol})`;
   const lines = [
-    ...source(description, model),
+    ...source(description, model, system),
     "",
-    `y0 = [${state.y0.map(python).join(", ")}]`,
-    `params = {${params.join(", ")}}`,
-    `sol = system.solve(${span}, y0, params, ${options.join(", ")})`,
+    `${y0} = [${state.y0.map(python).join(", ")}]`,
+    `${values} = {${params.join(", ")}}`,
+    `${sol} = ${system}.solve(${span}, ${y0}, ${values}, ${options.join(", ")})`,
     "",
-    "print(sol.message)",
-    "print(sol.switches)",
+    `print(${sol}.message)`,
+    `print(${sol}.switches)`,
     "",
     '# The picture; needs Matplotlib: pip install "filippov[plot]"',
     `ax = fl.plot.${picture}`,
     'ax.figure.savefig("picture.png")',
   ];
   return `${lines.join("\n")}\n`;
-}
-
-/** The name of the last function that a text defines. */
-export function lastFunction(text: string): string | null {
-  return [...text.matchAll(/^def\s+([A-Za-z_]\w*)/gm)].at(-1)?.[1] ?? null;
 }
 
 /** A number as Python prints it, which it reads back to the same bits. */
@@ -52,13 +54,37 @@ function quoted(text: string): string {
   return mark + text.replaceAll("\\", "\\\\").replaceAll(mark, `\\${mark}`) + mark;
 }
 
-function source({ page, states }: Description, model: Uint8Array): string[] {
+/** A name that the functions of the text do not read: they may read one that the text assigns. */
+function free(name: string, page: Page): string {
+  const isRead = page.text && inText(page) && new RegExp(`(?<!^)(?<![.\\w])${name}\\b`, "m").test(page.text);
+  return isRead ? `${name}_` : name;
+}
+
+/** The name of the system in the text, or of its function. */
+function inText({ function: name, object }: Page): string | null {
+  return [object, name].find((given) => given && /^[\p{L}_][\p{L}\p{N}_]*$/u.test(given)) ?? null;
+}
+
+/** The lines of a text with the names that a page knows without an import. */
+function runnable(given: string): string[] {
+  const future = given.match(/^from __future__ import .*/gm) ?? [];
+  const text = given.replace(/^from __future__ import .*\n?/gm, "");
+  const has = (pattern: string) => new RegExp(pattern, "m").test(text);
+  const lines = Object.entries(IMPORTS)
+    .filter(([name, line]) => (name === "fl" || has(`\\b${name}\\.`)) && !has(`^${line}\\s*$`))
+    .map(([, line]) => line);
+  if (has("\\b__name__\\b")) lines.push('__name__ = "model"  # as on the page, which skips what is under "__main__"');
+  return [...future, ...lines, text.trimEnd()];
+}
+
+function source({ page, states }: Description, model: Uint8Array, system: string): string[] {
   const { reference, text } = page;
   if (reference && /^\w+$/.test(reference)) return ["import filippov as fl", "", `system = fl.problems.get("${reference}").system()`];
-  const name = text ? lastFunction(text) : null;
+  const name = inText(page);
   if (text && name) {
     const names = states.map(quoted).join(", ") + (states.length === 1 ? "," : "");
-    return ["import filippov as fl", text.trimEnd(), "", `system = fl.System(${name}, states=(${names}))`];
+    const made = name === page.object ? name : `fl.System(${name}, states=(${names}))`;
+    return [...runnable(text), "", `${system} = ${made}`];
   }
   return [
     "import base64",

@@ -278,9 +278,27 @@ impl<'a> Reader<'a> {
         if let (Some(left), Some(right)) = (number(left), number(right)) {
             return arithmetic(part, op, left, right);
         }
+        let are_truths = self.is_truth(left) && self.is_truth(right);
+        if op == BinaryOp::Add && are_truths {
+            let error = "`+` of two comparisons is a logical or in NumPy: write `|`, or 1.0 * (v > 0) for a number";
+            return refuse(part, error);
+        }
         let (a, b) = self.operands(part, left, right)?;
         self.tracer.place = part.range();
-        Ok(Value::Node(self.tracer.operation(op, a, b)))
+        let found = self.tracer.operation(op, a, b);
+        if op == BinaryOp::Mul && are_truths {
+            self.tracer.truths.insert(found);
+        }
+        Ok(Value::Node(found))
+    }
+
+    /// Is it a comparison in NumPy: one, or a product of such?
+    fn is_truth(&self, value: &Value) -> bool {
+        match value {
+            Value::Condition(_) | Value::Truth(_) => true,
+            Value::Node(node) => self.tracer.truths.contains(node),
+            _ => false,
+        }
     }
 
     /// `a // b`.

@@ -23,8 +23,10 @@ const MODEL: &str = "rhs";
 /// A system that was read from a text.
 #[derive(Clone, Debug)]
 pub struct TextModel {
-    /// The name of the function.
+    /// The name of the system in the text, or of the function.
     pub name: String,
+    /// Whether the text makes a system of the function, by `@fl.system` or `fl.System(...)`.
+    pub is_system: bool,
     /// The system.
     pub system: SavedSystem,
     /// The numbers with the name `y0` in the text, if it has any.
@@ -60,41 +62,35 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
     let mut tracer = Tracer::new(Names::default(), Vec::new(), None);
     let mut reader = Reader::new(&mut tracer, &imported, Rc::clone(&scope));
     reader.is_outside = true;
+    // As in an imported module: nothing under `if __name__ == "__main__"` is run.
+    scope.set("__name__", Value::Text("model".into()));
     let mut functions: Vec<String> = Vec::new();
-    let mut systems: Vec<(String, Rc<SystemText>)> = Vec::new();
     let mut places = BTreeMap::new();
     for statement in body {
         match statement {
             Stmt::Import(_) | Stmt::ImportFrom(_) => {}
             Stmt::FunctionDef(def) => {
                 let (name, value) = read_function(&mut reader, def)?;
-                match &value {
-                    Value::System(system) => systems.push((name.clone(), Rc::clone(system))),
-                    _ => functions.push(name.clone()),
+                if let Value::Function(_) = &value {
+                    functions.push(name.clone());
                 }
                 scope.set(&name, value);
             }
-            Stmt::If(chain) if is_for_a_script(&chain.test) => {}
-            Stmt::Assign(assign) => {
+            Stmt::Assign(_) | Stmt::AnnAssign(_) => {
                 reader.run(std::slice::from_ref(statement))?;
-                if let [Expr::Name(name)] = &assign.targets[..] {
-                    let name = name.id.to_string();
-                    places.insert(name.clone(), assign.range());
-                    match scope.get(&name) {
-                        Some(Value::System(system)) => systems.push((name, system)),
-                        Some(Value::Function(_)) => functions.push(name),
-                        _ => {}
+                if let Some(name) = assigned(statement) {
+                    places.insert(name.clone(), statement.range());
+                    if let Some(Value::Function(_)) = scope.get(&name) {
+                        functions.push(name);
                     }
                 }
             }
-            Stmt::AnnAssign(_)
-            | Stmt::AugAssign(_)
-            | Stmt::For(_)
-            | Stmt::If(_)
-            | Stmt::Pass(_) => match reader.run(std::slice::from_ref(statement))? {
-                Flow::Next => {}
-                _ => return refuse(statement, what_it_is(statement)),
-            },
+            Stmt::AugAssign(_) | Stmt::For(_) | Stmt::If(_) | Stmt::Pass(_) => {
+                match reader.run(std::slice::from_ref(statement))? {
+                    Flow::Next => {}
+                    _ => return refuse(statement, what_it_is(statement)),
+                }
+            }
             Stmt::Expr(text) if text.value.is_string_literal_expr() => {}
             other => {
                 let error =
@@ -106,7 +102,7 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
     scope.names.borrow().values().for_each(Value::fix);
     let numbers = |name: &str| numbers(scope.get(name).as_ref());
     let (y0, t_span) = (numbers("y0"), numbers("t_span"));
-    let (name, system) = chosen(&scope, &functions, systems)?;
+    let (name, system, is_system) = chosen(&scope, &functions)?;
     let function = &system.function;
     let (n, states) = match (system.n, system.states.len()) {
         (Some(n), 0) => (n, Vec::new()),
@@ -149,6 +145,7 @@ fn read_module(body: &[Stmt]) -> Result<TextModel, Refused> {
     }
     Ok(TextModel {
         name,
+        is_system,
         system: traced(&system, &imported, n, states)?,
         y0,
         t_span,
@@ -184,14 +181,17 @@ fn note_imports(body: &[Stmt], imported: &mut BTreeMap<String, String>) {
     }
 }
 
-/// Is it `__name__ == "__main__"`?
-fn is_for_a_script(test: &Expr) -> bool {
-    match test {
-        Expr::Compare(chain) => {
-            matches!(&*chain.left, Expr::Name(name) if name.id.as_str() == "__name__")
-        }
-        _ => false,
-    }
+/// The name that an assignment binds, if it is a single one.
+fn assigned(statement: &Stmt) -> Option<String> {
+    let target = match statement {
+        Stmt::Assign(assign) => match &assign.targets[..] {
+            [target] => target,
+            _ => return None,
+        },
+        Stmt::AnnAssign(assign) => &*assign.target,
+        _ => return None,
+    };
+    target.as_name_expr().map(|name| name.id.to_string())
 }
 
 /// A function, or the system that a decorator makes of it.
@@ -232,14 +232,17 @@ fn decorator_arguments(reader: &mut Reader, decorator: &Decorator) -> Result<Arg
     })
 }
 
-/// The model of the text: its only system, or the function with the name `rhs`, or its last function.
-fn chosen(
-    scope: &Scope,
-    functions: &[String],
-    systems: Vec<(String, Rc<SystemText>)>,
-) -> Result<(String, Rc<SystemText>), Refused> {
+/// The model of the text: its only system, or the function with the name `rhs`, or its last function. And whether it is a system.
+fn chosen(scope: &Scope, functions: &[String]) -> Result<(String, Rc<SystemText>, bool), Refused> {
+    let names = scope.names.borrow();
+    let system = |(name, value): (&String, &Value)| match value {
+        Value::System(system) => Some((name.clone(), Rc::clone(system))),
+        _ => None,
+    };
+    let mut systems: Vec<_> = names.iter().filter_map(system).collect();
+    systems.sort_by_key(|(_, system)| system.place.start());
     match &systems[..] {
-        [(name, system)] => return Ok((name.clone(), Rc::clone(system))),
+        [(name, system)] => return Ok((name.clone(), Rc::clone(system), true)),
         [] => {}
         [.., (_, last)] => return refuse(&last.place, "the text has several systems"),
     }
@@ -251,7 +254,7 @@ fn chosen(
     {
         Some(name) => match scope.get(name) {
             Some(Value::Function(function)) => {
-                Ok((name.clone(), Rc::new(SystemText::of(function))))
+                Ok((name.clone(), Rc::new(SystemText::of(function)), false))
             }
             _ => refuse(
                 &ruff_text_size::TextRange::default(),
@@ -277,8 +280,16 @@ fn numbers(value: Option<&Value>) -> Option<Vec<f64>> {
 /// The names of the states in the first unpacking of the state: empty ones if they are no use as such.
 fn unpacked(body: &[Stmt], state: &str) -> Option<Vec<String>> {
     for statement in body {
+        let mut binding = Binding {
+            name: state,
+            is_found: false,
+        };
+        binding.visit_stmt(statement);
         let Stmt::Assign(assign) = statement else {
-            continue;
+            match binding.is_found {
+                true => return None,
+                false => continue,
+            }
         };
         let is_state = matches!(&*assign.value, Expr::Name(name) if name.id.as_str() == state);
         let names = assign.targets.iter().find_map(|target| match target {
@@ -301,8 +312,27 @@ fn unpacked(body: &[Stmt], state: &str) -> Option<Vec<String>> {
                 false => vec![String::new(); names.len()],
             });
         }
+        // From here on the name stands for something else than the state.
+        if binding.is_found {
+            return None;
+        }
     }
     None
+}
+
+/// Looks for an assignment to a name.
+struct Binding<'a> {
+    name: &'a str,
+    is_found: bool,
+}
+
+impl<'b> Visitor<'b> for Binding<'_> {
+    fn visit_expr(&mut self, expression: &'b Expr) {
+        if let Expr::Name(name) = expression {
+            self.is_found |= !name.ctx.is_load() && name.id.as_str() == self.name;
+        }
+        walk_expr(self, expression);
+    }
 }
 
 /// Counts the states of a function that does not unpack them: as many as are returned in the first list or tuple, and as many as

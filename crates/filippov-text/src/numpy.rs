@@ -398,7 +398,13 @@ impl Reader<'_> {
         let Some((first, others)) = items.split_first() else {
             return refuse(call, format!("np.{name} of nothing"));
         };
-        let mut total = first.clone();
+        let mut total = match (name, first) {
+            // NumPy counts comparisons in a sum.
+            ("sum" | "mean", Value::Condition(_) | Value::Truth(_)) => {
+                Value::Node(self.node(call, first)?)
+            }
+            _ => first.clone(),
+        };
         for item in others {
             total = match name {
                 "prod" => self.operation(call, Operator::Mult, &total, item)?,

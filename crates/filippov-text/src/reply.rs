@@ -11,8 +11,13 @@ pub fn reply(source: &str) -> Vec<u8> {
     let header = match read(source) {
         Ok(found) => {
             let n = found.system.definition.field.len();
+            let name = match found.is_system {
+                true => "object",
+                false => "function",
+            };
             let page = json!({
                 "title": found.name,
+                name: found.name,
                 "y0": found.y0.unwrap_or_else(|| vec![1.0; n]),
                 "t_span": found.t_span.unwrap_or_else(|| vec![0.0, 20.0]),
                 "text": source,

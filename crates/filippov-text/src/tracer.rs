@@ -3,7 +3,7 @@
 //! What is done here to a graph is what `python/filippov/trace/` does, in the same order, so that the graphs are the same:
 //! this file is `branching.py`, the others are `laws.rs`, `tables.rs` and `questions.rs`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use filippov_expr::{
@@ -69,6 +69,8 @@ pub struct Tracer {
     /// What was compared while the constants of motion are not known, and whether that mattered.
     pub asked: Vec<NodeId>,
     pub is_doubtful: bool,
+    /// Products of comparisons: truth values in NumPy.
+    pub truths: BTreeSet<NodeId>,
     /// The part of the text that is read now.
     pub place: TextRange,
     constants: Option<Constants>,
@@ -97,6 +99,7 @@ impl Tracer {
             has_pieces: false,
             asked: Vec::new(),
             is_doubtful: false,
+            truths: BTreeSet::new(),
             place: TextRange::default(),
             constants,
             pieces: BTreeMap::new(),

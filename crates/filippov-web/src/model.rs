@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use filippov::action::Actions;
-use filippov::{PiecewiseSystem, ReadySystem, RunnableSystem, SavedSystem};
+use filippov::{Laws, PiecewiseSystem, ReadySystem, RunnableSystem, SavedSystem};
 use filippov_expr::container::Tag;
 use filippov_expr::Backend;
 use serde_json::{Map, Value};
@@ -61,6 +61,19 @@ pub trait Source: Send + Sync {
     /// # Errors
     /// If there is none.
     fn ready(&self, params: &[f64], t: f64, x: &[f64]) -> Result<Box<dyn Ready + '_>, Refusal>;
+
+    /// The discrete states at a start at (t, x) where another run left these; `None` if they are not known, as at any start.
+    ///
+    /// # Errors
+    /// If a function of the model fails.
+    fn going_on(
+        &self,
+        _params: &[f64],
+        _at: (f64, &[f64]),
+        _before: &[f64],
+    ) -> Result<Option<Vec<f64>>, Refusal> {
+        Ok(None)
+    }
 }
 
 /// A system that is ready for a run.
@@ -72,9 +85,25 @@ pub trait Ready {
     fn actions(&self) -> Actions<'_>;
 }
 
-impl Source for RunnableSystem {
+/// A system that was compiled, and its laws.
+struct Compiled {
+    system: RunnableSystem,
+    laws: Laws,
+}
+
+impl Source for Compiled {
     fn ready(&self, params: &[f64], t: f64, x: &[f64]) -> Result<Box<dyn Ready + '_>, Refusal> {
-        Ok(Box::new(self.at(params, t, x)?))
+        Ok(Box::new(self.system.at(params, t, x)?))
+    }
+
+    fn going_on(
+        &self,
+        params: &[f64],
+        at: (f64, &[f64]),
+        before: &[f64],
+    ) -> Result<Option<Vec<f64>>, Refusal> {
+        let system = self.system.system().with_parameters(params.to_vec());
+        Ok(Some(self.laws.go_on(&system, at, before)?))
     }
 }
 
@@ -142,12 +171,15 @@ impl Model {
             is_pinned: saved.valid_for.is_some(),
             page,
         };
+        // Read once more: a copy of the definition needs code that nothing else here has.
+        let again = unpack(bytes).map_err(refused)?.0.definition;
+        let (_, laws) = again.build(Backend::Interpreter).map_err(refused)?;
         let system = saved.build(Backend::Auto).map_err(refused)?;
         let surfaces = 0..system.n_visible();
         description.surfaces = surfaces
             .map(|j| PiecewiseSystem::surface_name(system.system(), j))
             .collect();
-        Model::new(description, Box::new(system))
+        Model::new(description, Box::new(Compiled { system, laws }))
     }
 
     /// The number of states.
@@ -179,6 +211,15 @@ impl Model {
             return Err(Refusal::request(text));
         }
         self.source.ready(params, t, x)
+    }
+
+    pub(crate) fn going_on(
+        &self,
+        params: &[f64],
+        at: (f64, &[f64]),
+        before: &[f64],
+    ) -> Result<Option<Vec<f64>>, Refusal> {
+        self.source.going_on(params, at, before)
     }
 }
 

@@ -102,6 +102,16 @@ impl SectionRequest {
         self.period(index).map(|period| period * ticks)
     }
 
+    /// The first tick of the clock of run number `index`, from a time on.
+    pub fn first_tick(&self, index: usize, t: f64) -> Option<f64> {
+        match (&self.place, self.period(index)) {
+            (Where::Ticks { phase, .. }, Some(period)) => {
+                Some(phase + ((t - phase) / period).ceil() * period)
+            }
+            _ => None,
+        }
+    }
+
     fn period(&self, index: usize) -> Option<f64> {
         match &self.place {
             Where::Ticks { periods, .. } => periods.get(index).or(periods.first()).copied(),

@@ -54,6 +54,8 @@ class Page(NamedTuple):
         The function of the system as Python text.
     reference : str or None
         The name of the reference problem that it is.
+    function, object : str or None
+        What the system is in the text: the name of its function, or of a `System` that the text makes.
     """
 
     system: System
@@ -68,6 +70,8 @@ class Page(NamedTuple):
     axes: tuple[int, int] | None = None
     text: str | None = None
     reference: str | None = None
+    function: str | None = None
+    object: str | None = None
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -92,7 +96,7 @@ class Page(NamedTuple):
 
     def section(self) -> str:
         """Return everything except the system as JSON, for the container."""
-        fields = {
+        fields: dict[str, Any] = {
             "title": self.title,
             "y0": self.y0,
             "t_span": self.t_span,
@@ -104,6 +108,8 @@ class Page(NamedTuple):
             "text": self.text,
             "reference": self.reference,
         }
+        in_text = {"function": self.function, "object": self.object}
+        fields |= {key: name for key, name in in_text.items() if name}
         return json.dumps(fields, allow_nan=False)
 
     def to_bytes(self) -> bytes:
@@ -152,7 +158,9 @@ class Page(NamedTuple):
         page = make_page(
             system, known.pop("y0", None), known.pop("t_span", None), known.pop("ranges", None), **known
         )
-        return page._replace(reference=_known_reference(fields.get("reference")))
+        function, made = (_name(fields.get(key)) for key in ("function", "object"))
+        reference = _known_reference(fields.get("reference"))
+        return page._replace(reference=reference, function=function, object=made)
 
 
 _FIELDS = ("title", "y0", "t_span", "rtol", "atol", "method", "ranges", "axes", "text")
@@ -190,7 +198,7 @@ def make_page(
     axes : pair of int or str, optional
         The states on the axes of the phase portrait; the first two by default.
     text : str, optional
-        The function of the system as Python text, to be shown and exported.
+        The function of the system as Python text, to be shown.
 
     Returns
     -------
@@ -325,6 +333,10 @@ def _axes(axes: Any, states: Sequence[str]) -> tuple[int, int]:
     if len(found) != 2 or found[0] == found[1]:
         raise InputError(f"axes: two different states are needed, not {axes!r}")
     return found[0], found[1]
+
+
+def _name(name: Any) -> str | None:
+    return name if isinstance(name, str) and name.isidentifier() else None
 
 
 def _known_reference(name: Any) -> str | None:

@@ -12,6 +12,12 @@ from filippov.app.page import Page
 __all__ = ["write_script"]
 
 _LINE = 96
+_IMPORTS = {
+    "math": "import math",
+    "numpy": "import numpy",
+    "np": "import numpy as np",
+    "fl": "import filippov as fl",
+}
 
 
 def write_script(
@@ -51,31 +57,27 @@ def write_script(
     options = f"rtol={page.rtol!r}, atol={page.atol!r}"
     if page.method != "auto":
         options += f", method={page.method!r}"
-    run = f"sol = system.solve({span!r}, y0, params, {options})"
-    lines = [*_system(page), "", f"y0 = {start!r}", f"params = {values!r}", run, ""]
-    lines += ["print(sol.message)", "print(sol.switches)", ""]
-    lines += ['# The picture; needs Matplotlib: pip install "filippov[plot]"', *_picture(page)]
+    system, begin, named, sol = (_free(name, page) for name in ("system", "y0", "params", "sol"))
+    run = f"{sol} = {system}.solve({span!r}, {begin}, {named}, {options})"
+    lines = [*_system(page, system), "", f"{begin} = {start!r}", f"{named} = {values!r}", run, ""]
+    lines += [f"print({sol}.message)", f"print({sol}.switches)", ""]
+    lines += ['# The picture; needs Matplotlib: pip install "filippov[plot]"', *_picture(page, sol)]
     return "\n".join(lines) + "\n"
 
 
-def _picture(page: Page) -> list[str]:
+def _picture(page: Page, sol: str) -> list[str]:
     if page.axes is not None:
         x, y = (page.states[axis] for axis in page.axes)
-        return [f"ax = fl.plot.phase(sol, {x!r}, {y!r})", 'ax.figure.savefig("picture.png")']
-    return ["ax = fl.plot.time_series(sol)", 'ax.figure.savefig("picture.png")']
+        return [f"ax = fl.plot.phase({sol}, {x!r}, {y!r})", 'ax.figure.savefig("picture.png")']
+    return [f"ax = fl.plot.time_series({sol})", 'ax.figure.savefig("picture.png")']
 
 
-def _system(page: Page) -> list[str]:
+def _system(page: Page, system: str) -> list[str]:
     if page.reference is not None:
         return ["import filippov as fl", "", f'system = fl.problems.get("{page.reference}").system()']
-    name = _last_function(page.text) if page.text else None
-    if page.text and name:
-        return [
-            "import filippov as fl",
-            page.text.rstrip(),
-            "",
-            f"system = fl.System({name}, states={page.states!r})",
-        ]
+    if page.text and (page.object or page.function):
+        made = page.object or f"fl.System({page.function}, states={page.states!r})"
+        return [*_runnable(page.text), "", f"{system} = {made}"]
     why = page.why_it_stays()
     if why:
         return [
@@ -98,6 +100,25 @@ def _system(page: Page) -> list[str]:
     ]
 
 
-def _last_function(text: str) -> str | None:
-    found = re.findall(r"^def\s+([A-Za-z_]\w*)", text, re.MULTILINE)
-    return found[-1] if found else None
+def _free(name: str, page: Page) -> str:
+    """Return a name that the functions of the text do not read: they may read one that the text assigns."""
+    is_read = page.text and (page.object or page.function) and _has(rf"(?<!^)(?<![.\w]){name}\b", page.text)
+    return f"{name}_" if is_read else name
+
+
+def _runnable(text: str) -> list[str]:
+    """Return the lines of a text with the names that a page knows without an import."""
+    future = re.findall(r"^from __future__ import .*", text, re.MULTILINE)
+    text = re.sub(r"^from __future__ import .*\n?", "", text, flags=re.MULTILINE)
+    lines = [
+        line
+        for name, line in _IMPORTS.items()
+        if (name == "fl" or _has(rf"\b{name}\.", text)) and not _has(rf"^{line}\s*$", text)
+    ]
+    if _has(r"\b__name__\b", text):
+        lines.append('__name__ = "model"  # as on the page, which skips what is under "__main__"')
+    return [*future, *lines, text.rstrip()]
+
+
+def _has(pattern: str, text: str) -> bool:
+    return re.search(pattern, text, re.MULTILINE) is not None

@@ -176,6 +176,7 @@ def _as_json(solution: Solution, model: Model, values: dict[str, float]) -> dict
         "warnings": [{"t": w.t, "code": w.code, "message": w.message} for w in solution.warnings],
         "t": solution.t,
         "y": dict(zip(solution.states, solution.y, strict=True)),
+        "discrete": solution.discrete,
         "outputs": solution.outputs,
         "segments": [{"t_start": s.t_start, "t_end": s.t_end, "mode": s.mode} for s in solution.segments],
         "switches": [

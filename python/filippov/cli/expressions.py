@@ -39,6 +39,13 @@ def expression(text: str, names: Sequence[str], where: str) -> Any:
     for name in used:
         if name not in names:
             raise Mistake(f"{where}: no parameter {name!r}{hint(name, names)}")
-    # Nothing but arithmetic of numbers and names is left in the text.
-    value = eval(f"lambda {', '.join(used)}: {text}", {"__builtins__": {}, "pi": math.pi})
-    return value if used else value()
+    try:
+        # Powers of whole numbers have no bound on their digits; those of floats overflow.
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant):
+                node.value = float(str(node.value))
+        # Nothing but arithmetic of numbers and names is left in the text.
+        value = eval(f"lambda {', '.join(used)}: {ast.unparse(tree)}", {"__builtins__": {}, "pi": math.pi})
+        return value if used else value()
+    except (ArithmeticError, TypeError) as error:
+        raise Mistake(f"{where}: {text!r} has no value: {error}") from None

@@ -118,8 +118,10 @@ def interval(given: argparse.Namespace, model: Model) -> tuple[float, float]:
         return (0.0, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
     if model.t_span is None:
         raise Mistake("--t: the end is needed, `--t 100`, or t_span = (0, 100) in the file")
-    start, end = _numbers(model.t_span, "t_span of the file")[:2]
-    return start, end
+    ends = _numbers(model.t_span, "t_span of the file")
+    if len(ends) != 2:
+        raise Mistake(f"t_span of the file: start and end are needed, not {model.t_span!r}")
+    return ends[0], ends[1]
 
 
 def initial_state(given: argparse.Namespace, model: Model) -> list[float]:

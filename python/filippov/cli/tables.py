@@ -31,7 +31,7 @@ def write_rows(names: Iterable[str], columns: Sequence[Sequence[Any]], path: Pat
 
 
 def write_csv(solution: Solution, path: Path) -> None:
-    """Write times, states and modes to a CSV file, every number with all of its digits."""
+    """Write times, states, discrete states and modes to a CSV file, every number with all of its digits."""
     columns = _columns(solution)
     write_rows(columns, list(columns.values()), path)
 
@@ -55,7 +55,8 @@ def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None
 def _columns(solution: Solution) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = {"t": solution.t.tolist()}
     columns |= {name: solution.y[k].tolist() for k, name in enumerate(solution.states)}
-    columns |= {name: values.tolist() for name, values in solution.outputs.items()}
+    others = {**solution.discrete, **solution.outputs}
+    columns |= {name: values.tolist() for name, values in others.items()}
     if solution.surfaces and len(solution.segments):
         starts = solution.segments.t_start
         modes = [str(mode) for mode in solution.segments.mode]

@@ -25,7 +25,7 @@ from filippov.scalars import real
 from filippov.system import System
 from filippov.unknown import did_you_mean
 
-__all__ = ["Equilibria", "ends_of", "equilibria"]
+__all__ = ["Equilibria", "ends_of", "equilibria", "states_in"]
 
 # Bounds are tried for so few states and modes, and over so many boxes.
 _MOST_STATES, _MOST_BOXES, _MOST_MODES = 4, 30_000, 2187
@@ -149,7 +149,7 @@ def equilibria(
     check_keywords(options, system, equilibria)
     low, high = ends_of(box, system)
     motions = Motions(system, len(low), system.parameter_values(params), (), options)
-    refuse_without_equilibria(motions)
+    refuse_without_equilibria(motions, states_in(low, high))
     core = motions.prepared.core
     assert isinstance(core, TracedSystem)
     search = _Search(motions, core, low, high, virtual, progress)
@@ -160,8 +160,15 @@ def equilibria(
     if unresolved:
         more, lines = _by_starts(search, modes)
         found = _merged(search, found, more, _SAME)
+    if found:
+        refuse_without_equilibria(motions, np.array([point.y for point in found]))
     found.sort(key=lambda point: (point.codimension, tuple(point.y.tolist()), tuple(point.mode)))
     return Equilibria(found, not unresolved and not motions.prepared.actions, unresolved, lines)
+
+
+def states_in(low: Array, high: Array) -> Array:
+    """Return some states of a box, a row for each."""
+    return np.asarray(low + (high - low) * np.random.default_rng(20).uniform(size=(32, len(low))))
 
 
 def ends_of(box: Any, system: System) -> tuple[Array, Array]:

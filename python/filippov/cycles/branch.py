@@ -87,6 +87,8 @@ class Special(NamedTuple):
     state : Cycle or Equilibrium
     test : object
         Which test function vanishes.
+    tangent : tuple of float
+        At BP: the direction of the branch, by its unknowns and the parameter.
     """
 
     code: str
@@ -97,6 +99,7 @@ class Special(NamedTuple):
     point: int
     state: State
     test: Any = None
+    tangent: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} = {value:.12g}" for name, value in self.params.items())

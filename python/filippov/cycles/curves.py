@@ -187,6 +187,8 @@ class _CurveSide:
 
     def _keep(self, point: Step, tests: dict[Any, float] | None = None) -> None:
         self.extended.condition.keep(point)
+        if isinstance(self.extended.curve, CycleCurve):
+            self.extended.curve.remember(point.w)
         self.tests = self._tests(point) if tests is None else tests
         self.trail.append((self.w, self.tests))
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))

@@ -568,20 +568,23 @@ def _check_section(section: Any) -> Phase | Event | None:
 
 def _is_forced(motions: Motions, t0: float, x: Array, period: Any) -> bool:
     scale = float(period) if isinstance(period, (int, float)) else 1.0
+    record = motions.record((t0, t0 + scale), x)
+    motions.see(record.solution.y.T)
     if depends_on_time(motions, scale):
         return True
-    record = motions.record((t0, t0 + scale), x)
     return any(not instant.guards for instant in record.instants if instant.acts)
 
 
 def _from_itinerary(motions: Motions, given: Itinerary | Cycle, period: Any) -> Cycle:
     if isinstance(given, Cycle):
         _check_fits(motions, given._parts)
+        motions.see(np.array(given._parts.starts))
         own = given._shooting.period
         return cycle_of(motions, given._parts, own if period is None else GivenPeriod(period))
     if not isinstance(given, Itinerary):
         raise InputError(f"itinerary: that of a cycle is needed, not {type(given).__name__}")
     _check_fits(motions, given)
+    motions.see(np.array(given.starts))
     forced = None if period is None else GivenPeriod(period)
     if forced is not None:
         forced.multiple = max(1, round(given.period / forced.value(motions)))
@@ -616,6 +619,7 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
         refuse_other_period(motions, forcing.value(motions))
     else:
         span, solution = _first_span(motions, t0, x)
+        motions.see(solution.y.T)
         steps = np.diff(solution.t)
         ticks = ticks_of(motions, t0, x, span)
         if ticks is not None:

@@ -11,6 +11,8 @@ from filippov.cycles.shooting import Shooting, Shot, scales
 
 __all__ = ["CycleCurve"]
 
+_LEAST = 1e-2
+
 
 class CycleCurve:
     """Cycles with the itinerary of a cycle, in one or two parameters.
@@ -33,6 +35,8 @@ class CycleCurve:
         self.start = np.append(cycle._u, [cycle.params[name] for name in names])
         self.n_unknowns = len(cycle._u)
         self._latest: tuple[Array, int, Shot] | None = None
+        # The sizes of the states do not fall below a part of the largest along the curve.
+        self._least = np.zeros(self._shooting.n)
 
     @property
     def shooting(self) -> Shooting:
@@ -54,7 +58,10 @@ class CycleCurve:
 
     def scales(self, w: Array) -> Array:
         """Return the sizes by which unknowns and parameters are measured."""
-        return np.append(scales(self._shooting, w[: self.n_unknowns]), self.sizes)
+        found = scales(self._shooting, w[: self.n_unknowns])
+        n_states = self._shooting.m * self._shooting.n
+        found[:n_states] = np.maximum(found[:n_states], np.tile(self._least, self._shooting.m))
+        return np.append(found, self.sizes)
 
     def probes(self, w: Array) -> list[Probe]:
         """Return the test functions there."""
@@ -68,6 +75,10 @@ class CycleCurve:
         motions = self._shooting.motions.copy()
         shooting = Shooting(motions, self._shooting.itinerary(u), self._shooting.period)
         return Cycle(shooting, u, shot, error)
+
+    def remember(self, w: Array) -> None:
+        """Take the size of a cycle of the curve: one that shrinks to rest at zero has none of its own."""
+        self._least = np.maximum(self._least, _LEAST * self.scales(w)[: self._shooting.n])
 
     def refer_to(self, w: Array) -> None:
         """Fix the phase beside another cycle of the curve."""

@@ -31,6 +31,7 @@ from filippov.cycles.passing import (
     without_short_leg,
 )
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.shooting import scales
 from filippov.cycles.switching import single_at_doubling
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
@@ -47,8 +48,9 @@ _STEP_BEHIND = 2e-3
 _EARLIER = 2
 _WIDTH = 1e-13
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
-# A cycle that is so much larger grows without bound; so does a period while the parameter stands still.
-_UNBOUNDED, _STANDS = 1e4, 1e-8
+# A cycle that grows tenfold so often, to an asymptote, grows without bound; so does a period while the
+# parameter stands still.
+_TENFOLDS, _STANDS = 4, 1e-8
 # How far, by its size, a cycle is another one.
 _JUMPS = 0.2
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
@@ -57,8 +59,8 @@ _CRITICAL = 1e-3
 _SAVED_EVERY = 50
 # So many points of a cycle are looked at to see whether a state is on it.
 _PHASES = 40
-# An eigenvalue is real if its imaginary part is that part of the largest one, or less.
-_REAL = 1e-6
+# An eigenvalue is real if its imaginary part is that part of it, or less, or rounding: a part of the matrix.
+_REAL, _ROUNDING = 1e-6, 1e-14
 # Their test functions change signs with the direction.
 _TURNING = ("LP", "PSN", "BP")
 
@@ -174,7 +176,9 @@ def continuation(
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
     directions = [-1.0, 1.0]
     if isinstance(start, Special):
-        away = float(np.sign(first.params[parameter] - start.params[parameter]))
+        place = _Side(first, settings, 1.0).start.place
+        by_value = float(np.sign(first.params[parameter] - start.params[parameter]))
+        away = _way_from(start, place, first) or by_value or 1.0
         directions = [-away, away]
     sides: list[_Side] = []
 
@@ -356,7 +360,7 @@ class _Side:
         curve, w = curve_of(state, (self.settings.name,), (self.settings.size,))
         _, jacobian = curve.equations(w)
         place = place_of(curve, w, jacobian)
-        if place.tangent[-1] * direction < 0:
+        if (place.tangent[-1] or 1.0) * direction < 0:
             place = place._replace(tangent=-place.tangent)
         return self._position_at(curve, place, jacobian)
 
@@ -421,35 +425,49 @@ class _Side:
         name, first = self.settings.name, self.points[0]
         value = first.params[name]
         try:
-            if self._passes_start():
-                again = self._beside_start()
-            elif (self.points[-2].params[name] - value) * (self.points[-1].params[name] - value) <= 0:
+            again = self._beside_start()
+            if again is None:
+                if (self.points[-2].params[name] - value) * (self.points[-1].params[name] - value) > 0:
+                    return False
                 again = self._behind_at(value)
-            else:
-                return False
         except ModelError:
             return False
-        if not _is_same(again, first.state):
+        if not self._is_start(again):
             return False
         self.reason = f"the branch is closed: it comes back to its start at {name} = {value:.6g}"
         self.is_closed = True
         return True
 
-    def _passes_start(self) -> bool:
-        """Whether the last step leads through the plane across the branch at its start, near that."""
-        start, curve = self.start, self.here.curve
-        if self.earlier == [] or not _is_alike(start.curve, curve):
+    def _is_start(self, again: State) -> bool:
+        """Whether a state is that with which the branch starts."""
+        first = self.points[0].state
+        if isinstance(again, Cycle) and isinstance(first, Cycle):
+            return _is_same(again, first)
+        if not (isinstance(again, Equilibrium) and isinstance(first, Equilibrium)):
             return False
-        w, scale, tangent = start.place
-        before, now = ((place.w - w) / scale for place in (self.earlier[0], self.here.place))
-        is_near = np.linalg.norm(now) < 2.0 * np.linalg.norm(now - before)
-        return bool(before @ tangent < 0.0 <= now @ tangent and is_near)
+        if again.mode != first.mode:
+            return False
+        k = first._curve.n_unknowns
+        states = [point.state for point in self.points]
+        unknowns = [one._w[:k] for one in states if isinstance(one, Equilibrium) and one.mode == first.mode]
+        # A state that keeps its value has no extent.
+        extent = np.maximum(np.ptp(unknowns, axis=0), 1e-3 * first._curve.scales(first._w)[:k])
+        return bool(np.all(np.abs(again._w[:k] - first._w[:k]) < 1e-7 * extent))
 
-    def _beside_start(self) -> State:
-        """Return the state of the curve that is followed in the plane across the branch at its start."""
-        w, scale, tangent = self.start.place
-        step = corrected(self.here.curve, self.here.place.w, scale, tangent, float(w / scale @ tangent))
-        return self.here.curve.state(step.w, step.error)
+    def _beside_start(self) -> State | None:
+        """Return the state in the plane across the branch at its start, if the last step leads through it."""
+        (w, scale, tangent), curve = self.start.place, self.start.curve
+        if self.earlier == []:
+            return None
+        places = (self.earlier[0], self.here.place)
+        turned = (_as_unknowns_of(curve, self.here.curve, place.w, w) for place in places)
+        for ends in zip(*turned, strict=True):
+            before, now = ((end - w) / scale for end in ends)
+            is_near = np.linalg.norm(now) < 2.0 * np.linalg.norm(now - before)
+            if before @ tangent < 0.0 <= now @ tangent and is_near:
+                step = corrected(curve, ends[1], scale, tangent, float(w / scale @ tangent))
+                return curve.state(step.w, step.error)
+        return None
 
     def _behind_at(self, value: float) -> State:
         """Return the state within the last step at which the parameter has a value."""
@@ -493,16 +511,9 @@ class _Side:
         if not isinstance(first, Cycle) or not isinstance(last, Cycle):
             return False
         name, value = self.settings.name, float(self.here.place.w[-1])
-        starts = (np.max(np.abs(np.array(cycle.itinerary.starts))) for cycle in (first, last))
-        if next(starts) * _UNBOUNDED < next(starts):
-            size = _size_of(first)
-            # One that rests at the origin has no size to compare with.
-            size = size if size > first._shooting.motions.negligible else 1.0
-            if _size_of(last) > _UNBOUNDED * size:
-                self.reason = (
-                    f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
-                )
-                return True
+        if self._comes_to_an_asymptote():
+            self.reason = f"the cycle grows without bound near {name} = {value:.9g}, to {_size_of(last):.3g}"
+            return True
         if last.is_forced:
             return False
         values = []
@@ -518,6 +529,22 @@ class _Side:
                 )
                 return True
         return False
+
+    def _comes_to_an_asymptote(self) -> bool:
+        """Whether the parameter moves less than half as far by each tenfold of the cycle: it converges."""
+        cycles = [point.state for point in self.points if isinstance(point.state, Cycle)]
+        ends = (cycles[0], cycles[-1])
+        starts = [float(np.max(np.abs(np.array(cycle.itinerary.starts)))) for cycle in ends]
+        if starts[1] < 10.0**_TENFOLDS * starts[0]:
+            return False
+        sizes = np.array([_size_of(cycle) for cycle in cycles])
+        values = np.array([cycle.params[self.settings.name] for cycle in cycles])
+        marks = [np.flatnonzero(sizes * 10.0**k <= sizes[-1]) for k in range(_TENFOLDS, -1, -1)]
+        if not all(len(mark) for mark in marks):
+            return False
+        moved = np.abs(np.diff(values[[mark[-1] for mark in marks]]))
+        # A family of cycles at one value does not converge to it.
+        return bool(moved[0] > _STANDS * self.settings.size and np.all(moved[1:] < 0.5 * moved[:-1]))
 
     def _is_at_end(self) -> bool:
         """Whether the range ends here, and the branch does not lead into it."""
@@ -580,9 +607,11 @@ class _Side:
                     return False
                 return self._change(key, located, following.place.w)
             if _is_real(key, state):
-                self._add(key[0], key, curve, state)
+                self._add(key[0], key, curve, state, following.place.w - self.here.place.w)
         state = curve.state(step.w, step.error)
         curve.refer_to(step.w)
+        if isinstance(curve, CycleCurve):
+            curve.remember(step.w)
         finer = in_parts(state) if isinstance(state, Cycle) else None
         if finer is not None:
             following, state = self._finer(following, finer), finer
@@ -651,8 +680,8 @@ class _Side:
         _, s, point = nearest[0]
         return s, key, point
 
-    def _add(self, code: str, key: Any, curve: AnyCurve, state: State) -> None:
-        """Take down a special point."""
+    def _add(self, code: str, key: Any, curve: AnyCurve, state: State, secant: Array | None = None) -> None:
+        """Take down a special point, on a secant of the branch."""
         if code not in self.settings.detect:
             return
         name = self.settings.name
@@ -670,7 +699,9 @@ class _Side:
             surface = motions.prepared.surfaces[place] if place >= 0 else ""
         kind = f"{key[1]} vanishes" if code == "UZ" else CODES[code]
         params = {name: state.params[name]}
-        self.special.append(Special(code, kind, surface, t, params, len(self.points) - 1, state, key))
+        tangent = tuple(secant.tolist()) if code == "BP" and secant is not None else ()
+        place = len(self.points) - 1
+        self.special.append(Special(code, kind, surface, t, params, place, state, key, tangent))
 
     def _change(self, key: Any, located: Step, beyond: Array) -> bool:
         """Continue with the itinerary that the flow takes behind a special point. False: the branch ends."""
@@ -812,6 +843,21 @@ class _Side:
         return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
 
 
+def _way_from(special: Special, place: Place, first: State) -> float:
+    """Return 1.0 if the tangent at a state leads on from a special point, -1.0 if back, 0.0 if unknown.
+
+    At a Hopf point the parameter is stationary, and the states say it.
+    """
+    if not isinstance(first, Cycle):
+        return 0.0
+    if special.code != "HB" and first.params != special.state.params:
+        return 0.0
+    state = special.state
+    there = state.y if isinstance(state, Equilibrium) else state.from_event().y0
+    n = len(there)
+    return float(np.sign(place.tangent[:n] @ ((place.w[:n] - there) / place.scale[:n])))
+
+
 def _summary(curve: AnyCurve, place: Place) -> Array:
     """Return the rates of the first state, the period and the parameter along a direction."""
     assert isinstance(curve, CycleCurve)
@@ -838,20 +884,36 @@ def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
     return np.asarray(states[0] - states[1])
 
 
-def _is_same(one: State, other: State) -> bool:
-    """Whether two states are the same, from wherever they start."""
-    if isinstance(one, Cycle) and isinstance(other, Cycle):
-        if abs(one.period - other.period) > 1e-7 * other.period:
-            return False
-        if not one.is_forced and not one.itinerary.has_events():
-            return _is_on(other, one.at(one.t0 + 0.381966 * one.period))
-        own, its = (np.array(cycle.itinerary.starts) for cycle in (one, other))
-        near = 1e-6 * float(np.max(np.abs(its))) + other._shooting.motions.negligible
-        turned = (np.roll(own, k, axis=0) for k in range(len(own)))
-        return len(own) == len(its) and any(np.max(np.abs(rows - its)) < near for rows in turned)
-    if isinstance(one, Equilibrium) and isinstance(other, Equilibrium):
-        return one.mode == other.mode and np.allclose(one.y, other.y, rtol=1e-7, atol=1e-9)
+def _is_same(one: Cycle, other: Cycle) -> bool:
+    """Whether two cycles are the same, from whichever of their events they start."""
+    if abs(one.period - other.period) > 1e-7 * other.period or one.is_forced != other.is_forced:
+        return False
+    if not one.is_forced and not one.itinerary.has_events():
+        return _is_on(other, one.at(one.t0 + 0.381966 * one.period))
+    (own, since), (its, from_there) = _starts_of(one), _starts_of(other)
+    if len(own) != len(its):
+        return False
+    shooting = other._shooting
+    near = 1e-6 * scales(shooting, other._u)[: shooting.n] + shooting.motions.negligible
+    for k in range(len(own)):
+        times = np.roll(since, -k) - from_there
+        if one.is_forced:
+            # The forcing is the same after each of its periods.
+            multiple = 1 if shooting.period is None else shooting.period.multiple
+            times = times - other.period / multiple * np.round(times[0] * multiple / other.period)
+        else:
+            times = times - times[0]
+        times = (times + 0.5 * other.period) % other.period - 0.5 * other.period
+        is_near = np.all(np.abs(np.roll(own, -k, axis=0) - its) < near)
+        if is_near and np.max(np.abs(times)) < 1e-6 * other.period:
+            return True
     return False
+
+
+def _starts_of(cycle: Cycle) -> tuple[Array, Array]:
+    """Return the states and times at which the legs of a cycle start."""
+    durations = np.array(cycle.itinerary.durations)
+    return np.array(cycle.itinerary.starts), cycle.t0 + np.cumsum(durations) - durations
 
 
 def _is_on(cycle: Cycle, x: Array) -> bool:
@@ -865,14 +927,25 @@ def _is_on(cycle: Cycle, x: Array) -> bool:
     return bool(np.max(np.abs(nearest - x)) < 1e-6 * size)
 
 
-def _is_alike(one: AnyCurve, other: AnyCurve) -> bool:
-    """Whether two curves are in the same unknowns."""
-    if isinstance(one, CycleCurve) and isinstance(other, CycleCurve):
-        legs = one.shooting.legs, other.shooting.legs
-        return len(legs[0]) == len(legs[1]) and all(a.is_alike(b) for a, b in zip(*legs, strict=True))
-    if isinstance(one, EquilibriumCurve) and isinstance(other, EquilibriumCurve):
-        return one.mode == other.mode
-    return False
+def _as_unknowns_of(own: AnyCurve, other: AnyCurve, w: Array, near: Array) -> list[Array]:
+    """Return a point of another curve in the unknowns of a curve, from each leg at which it is alike."""
+    if isinstance(own, EquilibriumCurve) and isinstance(other, EquilibriumCurve):
+        return [w] if own.mode == other.mode else []
+    if not (isinstance(own, CycleCurve) and isinstance(other, CycleCurve)):
+        return []
+    legs, its = own.shooting.legs, other.shooting.legs
+    states, durations, t0 = other.shooting.parts(w[: other.n_unknowns])
+    found = []
+    for k in range(len(its) if len(its) == len(legs) else 0):
+        if not all(a.is_alike(b) for a, b in zip(legs, its[k:] + its[:k], strict=True)):
+            continue
+        parts = [np.roll(states, -k, axis=0).ravel(), np.roll(durations, -k)]
+        if own.shooting.is_free_in_time:
+            assert own.shooting.period is not None
+            t, single = t0 + sum(durations[:k]), sum(durations) / own.shooting.period.multiple
+            parts.append(np.array([t - single * np.round((t - near[own.n_unknowns - 1]) / single)]))
+        found.append(np.concatenate([*parts, w[other.n_unknowns :]]))
+    return found
 
 
 def _at_parameter(curve: AnyCurve, w: Array, value: float, scale: Array) -> Step:
@@ -891,10 +964,7 @@ def _is_real(key: Any, state: State) -> bool:
     code = key[0]
     if code == "HB":
         assert isinstance(state, Equilibrium)
-        values = state.eigenvalues
-        size = np.max(np.abs(values))
-        pairs = values[np.abs(values.imag) > _REAL * size]
-        return bool(np.min(np.abs(pairs.real), initial=np.inf) < 1e-5 * size)
+        return _has_critical_pair(state)
     if not isinstance(state, Cycle):
         return True
     values = state.nontrivial
@@ -904,6 +974,21 @@ def _is_real(key: Any, state: State) -> bool:
         critical = -1.0 if code == "PD" else 1.0
         return bool(np.min(np.abs(values - critical), initial=np.inf) < _CRITICAL)
     return True
+
+
+def _has_critical_pair(state: Equilibrium) -> bool:
+    """Whether a pair of eigenvalues is on the imaginary axis, each measured by itself."""
+    matrix = state._curve.linearisation(state._w)
+    values, vectors = np.linalg.eig(matrix)
+    try:
+        left = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        return False
+    # By so much rounding moves an eigenvalue: beside a fast variable it is simple, and moves little.
+    rounding = _ROUNDING * np.linalg.norm(matrix, 2) * np.linalg.norm(left, axis=1)
+    own = np.abs(values)
+    is_pair = np.abs(values.imag) > np.maximum(_REAL * own, rounding)
+    return bool(np.any(is_pair & (np.abs(values.real) < np.maximum(1e-5 * own, rounding))))
 
 
 def _other_branch(special: Special, name: str, size: float) -> State:

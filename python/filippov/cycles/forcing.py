@@ -45,27 +45,43 @@ def _places(n: int, m: int, count: int) -> tuple[Array, Array, Array]:
 
 
 class _Samples:
-    """Field and switching functions at some places."""
+    """Field and switching functions at some places, and at the states that the problem has."""
 
     def __init__(self, motions: Motions, count: int = _PLACES) -> None:
-        places = _places(motions.n, motions.prepared.core.n_surfaces, count)
-        self._motions, (self.units, self._states, self._signs) = motions, places
+        n_seen = len(motions.seen)
+        places = _places(motions.n, motions.prepared.core.n_surfaces, count + n_seen)
+        self._motions, self.units, self._signs = motions, places[0], places[2]
+        self._states = np.vstack([places[1][:count], motions.seen])
+        # The states of the problem may have other sizes than the places.
+        self._groups = [slice(0, count)] + [slice(count, None)] * bool(n_seen)
 
     def at(self, times: Array) -> Array:
         """Return them at a time for each place, a row for each."""
         return self._motions.right_hand_sides(times, self._states, self._signs)
 
     def difference(self, times: Array, period: float) -> Array:
-        """Return their differences over one period that are known."""
-        found = self.at(times + period) - self.at(times)
-        return np.asarray(found[np.isfinite(found)])
+        """Return their differences over one period that are known, each by the size of its component."""
+        now, later = self.at(times), self.at(times + period)
+        known = np.isfinite(now) & np.isfinite(later)
+        now, later = np.where(known, now, 0.0), np.where(known, later, 0.0)
+        found = later - now
+        for group in self._groups:
+            # The mean is smooth in the period; the largest value is not.
+            with np.errstate(over="ignore"):
+                squares = np.sum(now[group] ** 2 + later[group] ** 2, axis=0)
+            size = np.sqrt(squares / (2 * np.maximum(known[group].sum(axis=0), 1)))
+            found[group] /= np.where(size > 0.0, size, 1.0)
+        return np.asarray(found[known])
 
 
 def depends_on_time(motions: Motions, scale: float) -> bool:
-    """Whether field or switching functions contain the time; `scale` is a span of it."""
+    """Whether field or switching functions change with the time; `scale` is a span of it.
+
+    They are evaluated at some places, and at the states that the problem has (`Motions.see`).
+    """
     samples = _Samples(motions)
     first = samples.at(0.0 * samples.units)
-    later = [samples.at(k * scale * samples.units) for k in range(1, 4)]
+    later = [samples.at(k * scale * samples.units) for k in (1.0, 2.0, 3.0, 1e3, 1e6, 1e9)]
     return not all(np.array_equal(first, one, equal_nan=True) for one in later)
 
 
@@ -334,20 +350,9 @@ def _refined(motions: Motions, guess: float) -> float:
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    units, states, signs = _places(motions.n, motions.prepared.core.n_surfaces, _CONFIRMED_AT)
-    times = (period * units, period * (1.0 + units))
-    found = motions.right_hand_sides(
-        np.concatenate(times), np.concatenate([states, states]), np.concatenate([signs, signs])
-    )
-    known = np.isfinite(found).reshape(2, -1).all(axis=0)
-    now, later = found.reshape(2, -1)[:, known]
-    return bool(abs(later - now).max(initial=0.0) <= 1e-11 * abs(now).max(initial=1.0))
-
-
-def _size(motions: Motions) -> float:
-    samples = _Samples(motions)
-    found = np.abs(samples.at(samples.units))
-    return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
+    samples = _Samples(motions, _CONFIRMED_AT)
+    left = samples.difference(period * samples.units, period)
+    return bool(np.max(np.abs(left), initial=0.0) <= 1e-11)
 
 
 def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPeriod | None:
@@ -364,11 +369,10 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
 
 def _first_dip(motions: Motions, step: float, longest: float) -> float | None:
     """Return the first multiple of a step that is a period of the right-hand side."""
-    size = _size(motions)
     before = [np.inf, np.inf]
     for k in range(4, int(longest / step) + 1):
         value = float(np.max(np.abs(_difference_from_start(motions, k * step)), initial=0.0))
-        if before[1] < before[0] and before[1] <= value and before[1] < 0.2 * size:
+        if before[1] < before[0] and before[1] <= value and before[1] < 0.2:
             try:
                 return _refined(motions, (k - 1) * step)
             except ModelError:
@@ -386,7 +390,7 @@ def refuse_other_period(motions: Motions, period: float) -> None:
         If it is such a one.
     """
     left = _difference(motions, period)
-    if np.max(np.abs(left), initial=0.0) > 1e-6 * _size(motions):
+    if np.max(np.abs(left), initial=0.0) > 1e-6:
         raise InputError(f"period: field and switching functions are not the same after {period:.9g}")
 
 

@@ -39,6 +39,7 @@ _NOT_HERE = (
     *("fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"),
     *("t_eval", "dense_output", "keep", "wrt", "order", "nonunique", "progress"),
 )
+_MOST_SEEN = 32
 # Arguments of the functions that hand their options over: what was misspelled may be one of these.
 _OF_CALLERS = ("params", "t0", "section", "period", "itinerary", "transient", "mode", "progress")
 
@@ -146,6 +147,8 @@ class Motions:
         self._held: HeldMotions | None = None
         # Those of all runs; copies add to the same list.
         self.warnings: list[RunWarning] = []
+        # States of the problem, a row for each.
+        self.seen: Array = np.zeros((0, n))
         # What is computed, in a bar for each long run; none if it is empty.
         self.watched = ""
         self.use(params)
@@ -157,10 +160,14 @@ class Motions:
             "params": self._params,
             "by": self._by,
             "options": self.options,
+            "seen": self.seen,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        seen = state.pop("seen", None)
         self.__init__(**state)  # type: ignore[misc]
+        if seen is not None:
+            self.seen = seen
 
     @property
     def by(self) -> tuple[str, ...]:
@@ -207,6 +214,12 @@ class Motions:
         self._params, self._vector = params, parameter_vector(params)
         self._held = None
         self._guards: dict[tuple[Mode, tuple[float, ...]], list[Guard]] = {}
+
+    def see(self, states: Array) -> None:
+        """Take states, shape (k, n), as those of the problem: the forcing is looked for there."""
+        finite = states[np.isfinite(states).all(axis=1)]
+        chosen = np.linspace(0, len(finite) - 1, min(len(finite), _MOST_SEEN)).round().astype(int)
+        self.seen = finite[chosen]
 
     def copy(self) -> Motions:
         """Return a copy with its own parameters."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from filippov.analysis.observe import check_keywords
 from filippov.arrays import finite_array
-from filippov.cycles.box import ends_of, equilibria
+from filippov.cycles.box import ends_of, equilibria, states_in
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.motions import Array, Motions
 from filippov.cycles.rest import Equilibrium, refuse_without_equilibria
@@ -188,7 +188,7 @@ def phase_portrait(
     if not all(isinstance(cycle, Cycle) for cycle in cycles):
         raise InputError("cycles: each is a Cycle, as of fl.limit_cycle")
     motions = Motions(system, 2, system.parameter_values(params), (), {})
-    refuse_without_equilibria(motions)
+    refuse_without_equilibria(motions, states_in(*window.T))
     plane = _Plane(motions, window)
     lines = streamlines(plane.field, plane.mode_at, window, count("density", density))
     sheets = plane.surfaces(count("points", points))

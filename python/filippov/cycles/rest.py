@@ -406,15 +406,17 @@ def equilibrium(
     check_keywords(options, system, equilibrium)
     start = check_y0(y0, states=system._states)
     motions = Motions(system, len(start), system.parameter_values(params), (), options)
-    refuse_without_equilibria(motions)
+    refuse_without_equilibria(motions, start[None])
     entries = _mode_of(motions, start, mode)
     curve = EquilibriumCurve(motions, entries)
     w = np.append(start, first_multipliers(curve, start))
-    return rest_of(curve, w)
+    found = rest_of(curve, w)
+    refuse_without_equilibria(motions, found.y[None])
+    return found
 
 
-def refuse_without_equilibria(motions: Motions) -> None:
-    """Refuse a system whose motion is not that of one field for all times.
+def refuse_without_equilibria(motions: Motions, states: Array) -> None:
+    """Refuse a system whose motion is not that of one field for all times, at states of shape (k, n).
 
     Raises
     ------
@@ -427,6 +429,7 @@ def refuse_without_equilibria(motions: Motions) -> None:
             f"system: it has laws with a memory or clocks ({', '.join(core.laws())}), and its equilibria are "
             "not those of a field"
         )
+    motions.see(states)
     if depends_on_time(motions, 1.0):
         raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
     if any(action.when in ("clock", "times") for action in motions.prepared.actions):

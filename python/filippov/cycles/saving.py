@@ -119,6 +119,7 @@ def _read_special(row: Mapping[str, Any], build: _Builder) -> Special:
         row["point"],
         build.state(row),
         None if row["test"] is None else tuple(_tupled(row["test"])),
+        tuple(row.get("tangent", ())),
     )
 
 
@@ -141,6 +142,7 @@ def _special(special: Special) -> dict[str, Any]:
         "params": special.params,
         "point": special.point,
         "test": None if special.test is None else list(special.test),
+        "tangent": list(special.tangent),
         **_state(special.state),
     }
 

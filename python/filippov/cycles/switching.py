@@ -54,7 +54,7 @@ def other_branch(special: Special, name: str, size: float) -> State:
     if not isinstance(state, Cycle):
         raise InputError("start: other branches of equilibria begin at BE and HB")
     cycle = _doubled(state) if special.code == "PD" else state.from_event()
-    return _beside(CycleCurve(cycle, (name,), (size,)), special.code)
+    return _beside(CycleCurve(cycle, (name,), (size,)), special)
 
 
 def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
@@ -159,16 +159,20 @@ def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
     return cycle_at(b)
 
 
-def _beside(curve: CycleCurve, code: str) -> State:
+def _beside(curve: CycleCurve, special: Special) -> State:
     """Return a cycle beside the start of a curve, along the other direction of the kernel there."""
     w = curve.start
     scale = curve.scales(w)
     _, jacobian = curve.equations(w)
     kernel = np.linalg.svd(jacobian * scale)[2][-2:]
-    # The branch that is known has no component against itself half a period later; take what is across it.
-    along = tangent_of(jacobian, scale)
-    if code == "PD":
+    # Take what is across the branch that is known: a doubled cycle of it is the same half a period later.
+    if special.code == "PD":
         along = _symmetric(kernel, curve)
+    elif len(special.tangent) == len(w):
+        along = kernel.T @ (kernel @ (np.array(special.tangent) / scale))
+        along = along / np.linalg.norm(along)
+    else:
+        along = tangent_of(jacobian, scale)
     across = kernel - np.outer(kernel @ along, along)
     direction = across[int(np.argmax(np.linalg.norm(across, axis=1)))]
     direction = direction / np.linalg.norm(direction)
@@ -179,7 +183,7 @@ def _beside(curve: CycleCurve, code: str) -> State:
             continue
         if np.linalg.norm((step.w - w) / scale) > 0.1 * abs(distance):
             return curve.state(step.w, step.error)
-    raise ModelError(f"no other branch was found at {code}")
+    raise ModelError(f"no other branch was found at {special.code}")
 
 
 def _distances() -> Iterator[float]:

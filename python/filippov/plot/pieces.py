@@ -218,6 +218,8 @@ def curves_of(solution: Solution, wanted: Any, arguments: Sequence[str] = ()) ->
     if wanted is None:
         return Curves(tuple(range(len(names))), tuple(names))
     chosen = [wanted] if isinstance(wanted, (int, np.integer, str)) else list(wanted)
+    if not chosen:
+        raise ValueError(f"states: no state is given; the names are {', '.join([*names, *outputs])}")
     places: list[int | str] = []
     for argument, entry in zip_longest(arguments, chosen, fillvalue="states"):
         if isinstance(entry, str):

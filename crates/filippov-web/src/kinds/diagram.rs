@@ -38,14 +38,23 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
     let (mut params, mut start) = (wanted.params, wanted.y0);
     let (t0, t1) = wanted.t_span;
     let mut t_start = t0;
+    // The discrete states that the last run has left.
+    let mut memory = request.numbers("memory")?;
     let mut points = [Vec::new(), Vec::new(), Vec::new()];
     let (mut statuses, mut messages): (Vec<i32>, Vec<Value>) = (Vec::new(), Vec::new());
     for (index, &value) in values.iter().enumerate() {
         params[parameter] = value;
         let span = section.duration(index).unwrap_or(t1 - t0);
-        let ready = model.ready(&params, t_start, &start)?;
-        let (system, actions) = (ready.system(), ready.actions());
-        let solution = Problem::new(system, (t_start, t_start + span), &start)
+        // The state that a run leaves belongs to a tick: the next one starts at a tick of its own clock.
+        let tick = section.first_tick(index, t0).filter(|_| memory.is_some());
+        let from = tick.unwrap_or(t_start);
+        let ready = model.ready(&params, from, &start)?;
+        let (system, mut actions) = (ready.system(), ready.actions());
+        if let Some(before) = &memory {
+            let found = model.going_on(&params, (from, &start), before)?;
+            actions.discrete = found.unwrap_or(actions.discrete);
+        }
+        let solution = Problem::new(system, (from, from + span), &start)
             .options(&wanted.options)
             .actions(&actions)
             .solve_to_section(&section.section(index), &mut |_| false);
@@ -71,13 +80,13 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
                 .for_each(|(list, entry)| list.push(entry));
         }
         if carries && solution.stop.is_success() {
-            // At a clock the next run starts in the same phase.
             t_start = if section.n_periods().is_some() {
                 t0
             } else {
                 solution.t_last
             };
             start = solution.last_state().to_vec();
+            memory = Some(solution.discrete);
         }
     }
     let mut reply = Reply::new("diagram");
@@ -85,6 +94,9 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         // Where a request for further values begins.
         reply.set("t", t_start);
         reply.array("end", &[start.len()], &start);
+        if let Some(memory) = &memory {
+            reply.array("memory", &[memory.len()], memory);
+        }
     }
     reply.set("done", statuses.len());
     reply.set("status", statuses);

@@ -100,7 +100,7 @@ pub(super) fn place_in_contact(
     }
     let most = modes.iter().map(Mode::codimension).max().unwrap_or(0);
     let of = |held: usize| modes.iter().filter(move |mode| mode.codimension() == held);
-    let (mut viable, mut neutral) = (Vec::<Next>::new(), Vec::new());
+    let (mut viable, mut shared, mut neutral) = (Vec::<Next>::new(), None, Vec::new());
     for tried in (0..=most).rev().flat_map(of).cloned() {
         if at.patience.is_over() {
             return Ok(Err(Stop::Interrupted));
@@ -113,7 +113,11 @@ pub(super) fn place_in_contact(
         if viable.iter().any(slips) {
             continue;
         }
-        match begin(at, notes, &tried, contacts, meeting)? {
+        let (trial, shares_load) = begin(at, notes, &tried, contacts, meeting)?;
+        match trial {
+            Trial::Leaves(left) if shares_load => {
+                shared.get_or_insert(Next::new(tried, left));
+            }
             Trial::Leaves(left) => viable.push(Next::new(tried, left)),
             Trial::WithinRounding => neutral.push(tried),
             Trial::Ends => {}
@@ -132,6 +136,22 @@ pub(super) fn place_in_contact(
         return Ok(found.ok_or(Stop::Contact { surfaces: all }));
     }
     let n_closed = |mode: &Mode| contacts.iter().filter(|&&j| mode.entries()[j] == 0).count();
+    if let Some(shared) = shared {
+        // What is held without some of the contacts needs none of them.
+        let holds_as_much = |mode: &&Mode| {
+            meeting
+                .iter()
+                .all(|&j| mode.entries()[j] == shared.mode.entries()[j])
+        };
+        let held = neutral
+            .iter()
+            .filter(holds_as_much)
+            .min_by_key(|mode| n_closed(mode));
+        let Some(mode) = held.cloned() else {
+            return Ok(Ok(shared));
+        };
+        neutral = vec![mode];
+    }
     let mut best: Option<((usize, usize), Mode)> = None;
     for mode in neutral {
         let cost = (n_closed(&mode), n_led_back(at, &mode, meeting)?);
@@ -164,14 +184,14 @@ fn n_led_back(at: &Point, mode: &Mode, meeting: &[usize]) -> Result<usize, Field
 }
 
 /// Do all guards of a mode begin positive? Forces, multipliers and the first derivatives of the functions that leave zero
-/// tell where they are clear of rounding, else a trial.
+/// tell where they are clear of rounding, else a trial. And do its contacts share their load?
 fn begin(
     at: &Point,
     notes: &mut Notes,
     mode: &Mode,
     contacts: &[usize],
     meeting: &[usize],
-) -> Result<Trial, FieldError> {
+) -> Result<(Trial, bool), FieldError> {
     let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
     let mut field = at.field_of(mode, None);
     field.eval(at.t, &mut x, &mut velocity)?;
@@ -204,14 +224,15 @@ fn begin(
             _ => rounding * sizes[i / 2],
         };
         if exit.is_nan() || *exit < -noise {
-            return Ok(Trial::Ends);
+            return Ok((Trial::Ends, false));
         }
         is_clear &= *exit > noise;
     }
     let repels = matches!(&field, ModeField::Contact(field) if !field.attracts());
     if repels || velocity.iter().any(|v| !v.is_finite()) {
-        return Ok(Trial::Ends);
+        return Ok((Trial::Ends, false));
     }
+    let shares_load = matches!(&field, ModeField::Contact(field) if field.shares_load());
     let (mut left, mut row, signs) = (Lefts::new(), vec![0.0; x.len()], mode.signs());
     let speed = largest_speed(at, notes, mode, meeting, &velocity)?;
     for &j in contacts.iter().chain(meeting) {
@@ -243,14 +264,15 @@ fn begin(
         if leading.order == 0 || (is_tangent || is_located(j)) && !has_series {
             is_clear = false;
         } else if leading.sign() != entry {
-            return Ok(Trial::Ends);
+            return Ok((Trial::Ends, false));
         }
         left.push(Left::beside(j, leading));
     }
     if is_clear {
-        return Ok(Trial::Leaves(left));
+        return Ok((Trial::Leaves(left), shares_load));
     }
     let all: Vec<usize> = contacts.iter().chain(meeting).copied().collect();
     let next = Next::new(mode.clone(), Lefts::new());
-    try_mode(at, notes, &next, &all, rounding)
+    let trial = try_mode(at, notes, &next, &all, rounding)?;
+    Ok((trial, shares_load))
 }

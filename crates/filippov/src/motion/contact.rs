@@ -32,6 +32,8 @@ pub struct ContactField<'a> {
     sliding: Vec<usize>,
     setting: OwnSetting,
     n_evaluations: u64,
+    /// Did the equations of the last evaluation leave some of the multipliers open?
+    shares_load: bool,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
     /// The changes of the accelerations and rates by the multipliers, at the last evaluation.
@@ -73,6 +75,7 @@ impl<'a> ContactField<'a> {
             sliding,
             setting: OwnSetting::new(Setting::new(&signs, discrete)),
             n_evaluations: 0,
+            shares_load: false,
             multipliers: Vec::new(),
             coupling: Matrix::zeros(0),
             noise: Vec::new(),
@@ -103,6 +106,11 @@ impl<'a> ContactField<'a> {
             None => self.noise[index],
             Some(end) => DOUBTFUL * self.ratios[end / 2],
         }
+    }
+
+    /// Do contacts and what is slid on share their load at the last evaluation, in parts that are not determined?
+    pub fn shares_load(&self) -> bool {
+        self.shares_load
     }
 
     /// Do the fields around the surfaces slid on lead to them, with the forces of the contacts?
@@ -138,13 +146,16 @@ impl<'a> ContactField<'a> {
 
     /// The multipliers, from their equations; where these do not determine them, those with the largest reserves. None where there are
     /// no solutions, or where they give several motions.
-    fn solve(&self, rates: &[f64], directions: &[Vec<f64>]) -> Option<Vector> {
-        match Solutions::of(&self.coupling, rates) {
-            Some(solutions) if !solutions.directions.is_empty() => {
+    fn solve(&mut self, rates: &[f64], directions: &[Vec<f64>]) -> Option<Vector> {
+        let solutions = Solutions::of(&self.coupling, rates);
+        let shared = solutions.filter(|solutions| !solutions.directions.is_empty());
+        self.shares_load = shared.is_some();
+        match shared {
+            Some(solutions) => {
                 let is_one = moves_nothing(&solutions, directions);
                 is_one.then(|| solutions.most_reserved(&self.limits()))?
             }
-            _ => self.coupling.solve(rates),
+            None => self.coupling.solve(rates),
         }
     }
 
