@@ -137,20 +137,16 @@ pub(super) fn place_in_contact(
     }
     let n_closed = |mode: &Mode| contacts.iter().filter(|&&j| mode.entries()[j] == 0).count();
     if let Some(shared) = shared {
-        // What is held without some of the contacts needs none of them.
-        let holds_as_much = |mode: &&Mode| {
-            meeting
-                .iter()
-                .all(|&j| mode.entries()[j] == shared.mode.entries()[j])
-        };
-        let held = neutral
-            .iter()
-            .filter(holds_as_much)
-            .min_by_key(|mode| n_closed(mode));
-        let Some(mode) = held.cloned() else {
+        // What is held by friction alone needs no contact, and what contacts hold alone no friction.
+        let is_as = |mode: &Mode, j: &usize| mode.entries()[*j] == shared.mode.entries()[*j];
+        let slides = |mode: &Mode| meeting.iter().any(|&j| mode.entries()[j] == 0);
+        neutral.retain(|mode| {
+            meeting.iter().all(|j| is_as(mode, j))
+                || contacts.iter().all(|j| is_as(mode, j)) && !slides(mode)
+        });
+        if neutral.is_empty() {
             return Ok(Ok(shared));
-        };
-        neutral = vec![mode];
+        }
     }
     let mut best: Option<((usize, usize), Mode)> = None;
     for mode in neutral {
