@@ -5,16 +5,16 @@
 //! a_k d_k give it, and it lasts as long as one of them is admissible: until the least of the reserves (a force, the distance of a sign
 //! from its ends), which is taken of the solution for which it is largest, is zero.
 
-use super::small_matrix::{Matrix, Vector};
+use super::small_matrix::Matrix;
 use crate::tolerances::{DEFINITE_PIVOT, MOST_MEETING, SAME_NUMBER};
 use crate::vectors::dot;
 
 /// All solutions of linear equations of which some follow from the others.
 #[derive(Clone, Debug)]
 pub struct Solutions {
-    one: Vector,
+    one: Vec<f64>,
     /// Each may be added with any factor.
-    pub directions: Vec<Vector>,
+    pub directions: Vec<Vec<f64>>,
 }
 
 /// That a multiplier is admissible: `factor` times it plus `constant` is not negative; a reserve, in units in which 1 is large.
@@ -32,37 +32,30 @@ impl Solutions {
     /// Those of A z = b; `None` if there are none.
     pub fn of(matrix: &Matrix, b: &[f64]) -> Option<Self> {
         let n = matrix.n();
-        let largest = |values: &mut dyn Iterator<Item = f64>| {
-            let size = values.fold(0.0_f64, |size, v| size.max(v.abs()));
-            if size > 0.0 {
-                size
-            } else {
-                1.0
-            }
-        };
-        let rows: Vector = (0..n)
-            .map(|i| largest(&mut (0..n).map(|j| matrix[(i, j)])))
-            .collect();
-        let columns: Vector = (0..n)
-            .map(|j| largest(&mut (0..n).map(|i| matrix[(i, j)] / rows[i])))
-            .collect();
-        let mut left = Matrix::of(n, |i, j| matrix[(i, j)] / (rows[i] * columns[j]));
-        let mut right: Vector = b.iter().zip(&rows).map(|(b, size)| b / size).collect();
+        let (mut left, mut right) = (matrix.clone(), b.to_vec());
+        // The sizes of the rows, and of the columns beside them.
+        let (mut rows, mut columns) = (vec![0.0_f64; n], vec![0.0_f64; n]);
+        for i in 0..n {
+            (0..n).for_each(|j| rows[i] = rows[i].max(left[(i, j)].abs()));
+            (0..n).for_each(|j| columns[j] = columns[j].max(left[(i, j)].abs() / rows[i]));
+        }
         // Gauss and Jordan: a pivot is the largest entry in the rows and columns without one.
-        let mut pivots = Vec::<(usize, usize)>::new();
+        let (mut row_of, mut is_used) = (vec![None; n], vec![false; n]);
         loop {
-            let is_free =
-                |i: usize, j: usize| pivots.iter().all(|pivot| pivot.0 != i && pivot.1 != j);
-            let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-            let entries = entries.filter(|&(i, j)| is_free(i, j));
-            let size = |at: &(usize, usize)| left[*at].abs();
-            let Some((row, column)) = entries.max_by(|a, b| size(a).total_cmp(&size(b))) else {
-                break;
-            };
-            let pivot = left[(row, column)];
-            if pivot.abs() <= DEFINITE_PIVOT {
+            let (mut share, mut row, mut column) = (DEFINITE_PIVOT, 0, n);
+            for i in (0..n).filter(|&i| !is_used[i]) {
+                for j in (0..n).filter(|&j| row_of[j].is_none()) {
+                    let own = left[(i, j)].abs() / (rows[i] * columns[j]);
+                    if own > share {
+                        (share, row, column) = (own, i, j);
+                    }
+                }
+            }
+            if column == n {
                 break;
             }
+            (row_of[column], is_used[row]) = (Some(row), true);
+            let pivot = left[(row, column)];
             (0..n).for_each(|j| left[(row, j)] /= pivot);
             right[row] /= pivot;
             for i in (0..n).filter(|&i| i != row) {
@@ -70,43 +63,49 @@ impl Solutions {
                 (0..n).for_each(|j| left[(i, j)] -= factor * left[(row, j)]);
                 right[i] -= factor * right[row];
             }
-            pivots.push((row, column));
         }
-        let mut one = Vector::from_elem(0.0, n);
-        for &(row, column) in &pivots {
-            one[column] = right[row] / columns[column];
-        }
-        let free = (0..n).filter(|&j| pivots.iter().all(|pivot| pivot.1 != j));
+        let one: Vec<f64> = row_of
+            .iter()
+            .map(|row| row.map_or(0.0, |row| right[row]))
+            .collect();
         let direction = |j: usize| {
-            let mut direction = Vector::from_elem(0.0, n);
-            direction[j] = 1.0 / columns[j];
-            for &(row, column) in &pivots {
-                let share = left[(row, j)];
-                if share.abs() > DEFINITE_PIVOT {
-                    direction[column] = -share / columns[column];
+            let mut direction = vec![0.0; n];
+            direction[j] = 1.0;
+            for (k, row) in row_of.iter().enumerate() {
+                if let Some(row) = *row {
+                    let share = left[(row, j)];
+                    if share.abs() * columns[k] > DEFINITE_PIVOT * columns[j] {
+                        direction[k] = -share;
+                    }
                 }
             }
             direction
         };
+        let free = (0..n).filter(|&j| row_of[j].is_none());
         let directions = free.map(direction).collect();
-        let is_solved = |i: usize| {
-            let terms = (0..n).map(|j| matrix[(i, j)] * one[j]);
-            let (sum, size) = terms.fold((-b[i], b[i].abs()), |(sum, size), term| {
-                (sum + term, size + term.abs())
-            });
-            sum.abs() <= DEFINITE_PIVOT.sqrt() * size
-        };
-        (0..n)
-            .all(is_solved)
-            .then_some(Solutions { one, directions })
+        // What the terms of an equation may be, if they cancel.
+        let sides = b.iter().zip(&rows).map(|(b, size)| b.abs() / size);
+        let side = sides.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        for i in 0..n {
+            let (mut sum, mut size) = (-b[i], b[i].abs() + side * rows[i]);
+            for j in 0..n {
+                let term = matrix[(i, j)] * one[j];
+                (sum, size) = (sum + term, size + term.abs());
+            }
+            let is_solved = sum.abs() <= DEFINITE_PIVOT.sqrt() * size;
+            if !is_solved {
+                return None;
+            }
+        }
+        Some(Solutions { one, directions })
     }
 
     /// The solution whose least reserve is largest, or 1; `None` if there are too many limits to tell.
-    pub fn most_reserved(&self, limits: &[Limit]) -> Option<Vector> {
+    pub fn most_reserved(&self, limits: &[Limit]) -> Option<Vec<f64>> {
         // The reserve at coefficients a, each with its changes by them.
         let reserve = |limit: &Limit| {
             let changes = self.directions.iter();
-            let changes: Vector = changes
+            let changes: Vec<f64> = changes
                 .map(|d| limit.factor * d[limit.multiplier])
                 .collect();
             (
@@ -114,23 +113,24 @@ impl Solutions {
                 changes,
             )
         };
-        let unlimited = (1.0, Vector::from_elem(0.0, self.directions.len()));
-        let reserves: Vec<(f64, Vector)> = limits.iter().map(reserve).chain([unlimited]).collect();
+        let unlimited = (1.0, vec![0.0; self.directions.len()]);
+        let reserves: Vec<(f64, Vec<f64>)> =
+            limits.iter().map(reserve).chain([unlimited]).collect();
         if reserves.len() > 2 * MOST_MEETING + 1 {
             return None;
         }
         // It is largest where as many reserves are equal as there are unknowns.
         let n = self.directions.len() + 1;
-        let mut best: Option<(Vector, f64)> = None;
+        let mut best: Option<(Vec<f64>, f64)> = None;
         for chosen in
             (0_u32..1 << reserves.len()).filter(|chosen| chosen.count_ones() as usize == n)
         {
-            let equal: Vec<&(f64, Vector)> = (0..reserves.len())
+            let equal: Vec<&(f64, Vec<f64>)> = (0..reserves.len())
                 .filter(|i| chosen >> i & 1 == 1)
                 .map(|i| &reserves[i])
                 .collect();
             let entry = |i: usize, j: usize| equal[i].1.get(j).copied().unwrap_or(-1.0);
-            let values: Vector = equal.iter().map(|reserve| -reserve.0).collect();
+            let values: Vec<f64> = equal.iter().map(|reserve| -reserve.0).collect();
             let Some(mut found) = Matrix::of(n, entry).solve(&values) else {
                 continue;
             };
@@ -142,7 +142,7 @@ impl Solutions {
                 .iter()
                 .all(|(value, changes)| value + dot(changes, &found) >= least - noise);
             if is_least && best.as_ref().is_none_or(|(_, most)| least > *most) {
-                best = Some((found, least));
+                best = Some((found.into_vec(), least));
             }
         }
         let (coefficients, _) = best?;

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::guard::Guards;
 use super::{Guard, Motion, SmoothField};
-use crate::cube::{is_scaling_stable, Limit, Matrix, Solutions, Vector};
+use crate::cube::{is_scaling_stable, Limit, Matrix, Solutions};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::Actions;
@@ -146,7 +146,7 @@ impl<'a> ContactField<'a> {
 
     /// The multipliers, from their equations; where these do not determine them, those with the largest reserves. None where there are
     /// no solutions, or where they give several motions.
-    fn solve(&mut self, rates: &[f64], directions: &[Vec<f64>]) -> Option<Vector> {
+    fn solve(&mut self, rates: &[f64], directions: &[Vec<f64>]) -> Option<Vec<f64>> {
         let solutions = Solutions::of(&self.coupling, rates);
         let shared = solutions.filter(|solutions| !solutions.directions.is_empty());
         self.shares_load = shared.is_some();
@@ -155,7 +155,7 @@ impl<'a> ContactField<'a> {
                 let is_one = moves_nothing(&solutions, directions);
                 is_one.then(|| solutions.most_reserved(&self.limits()))?
             }
-            None => self.coupling.solve(rates),
+            None => self.coupling.solve(rates).map(SmallVec::into_vec),
         }
     }
 
@@ -259,7 +259,7 @@ fn gram(rows: &[Vec<f64>], directions: &[Vec<f64>]) -> Matrix {
 
 /// Have the equations of this matrix one solution each?
 fn is_regular(matrix: &Matrix) -> bool {
-    let solutions = Solutions::of(matrix, &Vector::from_elem(0.0, matrix.n()));
+    let solutions = Solutions::of(matrix, &vec![0.0; matrix.n()]);
     solutions.is_some_and(|solutions| solutions.directions.is_empty())
 }
 
@@ -369,7 +369,7 @@ impl SmoothField for ContactField<'_> {
             .collect();
         self.coupling = gram(&rows, &directions);
         self.multipliers = match self.solve(&rates, &directions) {
-            Some(found) => found.into_vec(),
+            Some(found) => found,
             None => vec![f64::NAN; rows.len()],
         };
         let (nu, mu) = self.multipliers.split_at(self.contacts.len());
