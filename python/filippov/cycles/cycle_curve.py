@@ -11,6 +11,7 @@ from filippov.cycles.shooting import Shooting, Shot, scales
 
 __all__ = ["CycleCurve"]
 
+# The part of its largest size along a curve below which the size of a state does not fall.
 _LEAST = 1e-2
 
 

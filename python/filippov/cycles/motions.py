@@ -39,6 +39,7 @@ _NOT_HERE = (
     *("fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"),
     *("t_eval", "dense_output", "keep", "wrt", "order", "nonunique", "progress"),
 )
+# So many states of a problem are kept.
 _MOST_SEEN = 32
 # Arguments of the functions that hand their options over: what was misspelled may be one of these.
 _OF_CALLERS = ("params", "t0", "section", "period", "itinerary", "transient", "mode", "progress")
