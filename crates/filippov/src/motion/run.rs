@@ -70,17 +70,10 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Does something beside its values tell where an exit function of the motion is positive? There is none in a region.
-    pub fn bounds_exits(&self) -> bool {
-        let motion = &self.motion;
-        motion.sliding().is_empty()
-            || motion.has_bounds() && !motion.slides_by_rule() && self.system.enclosures().is_some()
-    }
-
-    /// How long the step after one of length `dt` may be. A state at rest allows any, however the load on it varies: where only values
-    /// of exit functions are known, they may not change by more than [`STAGE_SPREAD`] of their size.
+    /// How long the step after one of length `dt` may be. A body at rest in contact allows any, however the load on it varies:
+    /// the exit functions may not change by more than [`STAGE_SPREAD`] of their size.
     pub fn longest_by_exits(&self, dt: f64) -> f64 {
-        if self.bounds_exits() {
+        if !self.motion.is_in_contact() {
             return f64::INFINITY;
         }
         let change = |seen: &Seen| (seen.range[1] - seen.range[0]) / seen.size();
