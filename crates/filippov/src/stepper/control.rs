@@ -106,7 +106,6 @@ impl StepControl {
             // The series tells.
             return Ok(longest);
         }
-        let is_in_contact = at.motion.is_in_contact();
         let (t, x, scale, field) = (at.t, &at.x, &at.scale, &mut at.motion.field);
         let derivative = steppers.start_derivative();
         let mode = &at.motion.mode;
@@ -115,8 +114,7 @@ impl StepControl {
         let pace = self.paces.first_step(mode, x, derivative, scale);
         let mut dt = match pace.filter(is_step) {
             Some(dt) => dt.min(longest),
-            // Steps become as long as exit functions allow only one by one.
-            None if is_step(&self.dt) && !is_in_contact => {
+            None if is_step(&self.dt) => {
                 restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
             }
             None => initial_step(field, t, x, derivative, scale, longest)?,
