@@ -67,3 +67,21 @@ def test_derivatives_go_on_through_their_rest(seed: int) -> None:
     assert run.warnings == []
     assert np.abs(exact.derivative()).max() > 0.01
     np.testing.assert_allclose(run.derivative(), np.repeat(exact.derivative(), 2, axis=0), atol=1e-7)
+
+
+@pytest.mark.parametrize("end", [15, 40, 75, 200, 500])
+@pytest.mark.parametrize("load", [1.1, 1.5])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_body_is_released_however_long_the_run(load: float, end: float, method: str) -> None:
+    # It falls onto a floor without a rebound and leaves as soon as the load exceeds its weight: at
+    # sin t = 1 / load. Its state says nothing of that.
+    floor = fl.Reset(lambda t, x: x[0], lambda t, x: [0.0, 0.0], direction="down")
+    body = fl.System(lambda t, x: [x[1], load * np.sin(t) - 1], n=2, resets=floor)
+    run = body.solve((0, end), [0.2, 0.0], method=method)
+    rests = [(piece.t_start, piece.t_end) for piece in run.segments if str(piece.mode) == "0"]
+    assert rests
+    released = np.arcsin(1 / load)
+    for start, last in rests:
+        turns = np.ceil((start - released) / (2 * np.pi) - 1e-9)
+        expected = released + 2 * np.pi * max(turns, 0)
+        assert abs(last - min(expected, end)) < 1e-6

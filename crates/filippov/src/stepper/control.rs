@@ -114,7 +114,10 @@ impl StepControl {
         let pace = self.paces.first_step(mode, x, derivative, scale);
         let mut dt = match pace.filter(is_step) {
             Some(dt) => dt.min(longest),
-            None if is_step(&self.dt) => {
+            // At rest a series has proposed any step, and the derivative supports it whatever the load does.
+            None if is_step(&self.dt)
+                && (self.dt.is_finite() || scale.norm(derivative, x) > 0.0) =>
+            {
                 restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
             }
             None => initial_step(field, t, x, derivative, scale, longest)?,
