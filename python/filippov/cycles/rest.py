@@ -20,6 +20,7 @@ import numpy.typing as npt
 from filippov._core import ModeBounds, TracedSystem
 from filippov.analysis.observe import check_keywords
 from filippov.cycles.forcing import depends_on_time
+from filippov.cycles.meeting import speed_away
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
@@ -109,7 +110,11 @@ class Equilibrium:
 
     @cached_property
     def attracts(self) -> bool:
-        """Whether the motion comes to the surfaces from beside them, to first order; yes in a region."""
+        """Whether the motion comes to the surfaces from beside them, to first order; yes in a region.
+
+        On two surfaces this is what the motions in the regions beside them do, on three or more what
+        multipliers do that follow the sides of the surfaces fast (hidden dynamics).
+        """
         return self._most_beside < 0
 
     @cached_property
@@ -117,6 +122,9 @@ class Equilibrium:
         """The largest real part of what leads away from its surfaces."""
         if not self._curve.sliding:
             return -1.0
+        if len(self._curve.sliding) == 2 and np.all(np.abs(self.multipliers) < 1.0):
+            most = speed_away(self._curve.normal_velocities(self._w))
+            return 0.0 if abs(most) <= _ROUNDING else most
         return _largest_real_part(np.linalg.eigvals(self._curve.normal_rates(self._w)))
 
     @property
@@ -130,7 +138,8 @@ class Equilibrium:
 
         ``"stable"``: all eigenvalues have negative real parts, and its surfaces attract. ``"unstable"``: one
         has a positive real part, or a surface repels. ``"neutral"``: neither, as for centres, lines of
-        equilibria, and meetings of surfaces that motions circle; terms of higher order decide.
+        equilibria, and meetings of surfaces that motions circle at a constant distance; terms of higher
+        order decide.
         """
         most = [_largest_real_part(self.eigenvalues), self._most_beside]
         if any(value > 0 for value in most):
@@ -294,6 +303,14 @@ class EquilibriumCurve:
         """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
         jacobian = self._by_unknowns(w)
         return np.asarray(jacobian[self.n :, : self.n] @ jacobian[: self.n, self.n :])
+
+    def normal_velocities(self, w: Array) -> dict[tuple[int, ...], Array]:
+        """Return the rates of the functions of the surfaces slid on, in each region beside them."""
+        normals, found = self.normals(w), {}
+        for corner, signs in self._corners:
+            velocity = self.motions.right_hand_side(0.0, w[: self.n], signs)[: self.n]
+            found[tuple(corner.astype(int).tolist())] = normals @ velocity
+        return found
 
     def _by_unknowns(self, w: Array) -> Array:
         """Return the derivatives by states and multipliers, (n + m, n + m), exact if the graph has them."""
