@@ -48,4 +48,6 @@ def figures_closed() -> Iterator[None]:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     yield
-    matplotlib.pyplot.close("all")
+    from matplotlib import pyplot
+
+    pyplot.close("all")

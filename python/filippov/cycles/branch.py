@@ -25,6 +25,7 @@ CODES = {
     "BP": "branch point",
     "HB": "Hopf",
     "PSN": "pseudo-saddle-node",
+    "PH": "pseudo-Hopf: its surfaces turn from attracting to repelling",
     "BE": "boundary equilibrium",
     "CS": "crossing-sliding",
     "GS": "grazing-sliding",

@@ -73,9 +73,9 @@ def condition_of(curve: AnyCurve, special: Special, w: Array) -> Condition:
         return _ProbeCondition(curve, special.test, w)
     if special.code in _SPECTRAL:
         return _SpectralCondition(curve, special, w)
-    if special.code == "BE":
+    if special.code in ("BE", "PH"):
         return _BoundaryCondition(curve, special.test)
-    codes = ", ".join((*_SPECTRAL, "BE", *PROBES))
+    codes = ", ".join((*_SPECTRAL, "BE", "PH", *PROBES))
     raise InputError(f"start: curves are those of {codes}, not of {special.code}")
 
 
@@ -140,7 +140,7 @@ def _slopes(value: Callable[[Array], float], curve: AnyCurve, w: Array) -> Array
 
 
 class _BoundaryCondition:
-    """An equilibrium lies on the boundary of its mode."""
+    """An equilibrium lies on the boundary of its mode, or nothing leads to its surfaces or away from them."""
 
     def __init__(self, curve: AnyCurve, key: tuple[Any, ...]) -> None:
         self.curve, self.key = curve, key
@@ -152,6 +152,8 @@ class _BoundaryCondition:
         return _slopes(self.value, self.curve, w)
 
     def beside(self, point: Step, tangent: Array) -> Tests:
+        if self.key[0] == "PH" and isinstance(self.curve, EquilibriumCurve):
+            return boundaries_of(self.curve, point.w)  # the eigenvalues are infinite
         return singular_values_of(self.curve, point.w)
 
     def is_genuine(self, code: str, w: Array) -> bool:

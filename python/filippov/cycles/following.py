@@ -47,6 +47,13 @@ _STEP_BEHIND = 2e-3
 # So many places before the last one say where the next one is.
 _EARLIER = 2
 _WIDTH = 1e-13
+# Special points that near to each other, in the size of the range, are at one place.
+_TOGETHER = 1e-9
+# Motions that go away from a surface no faster stay beside it; at a pole of the speed it is larger.
+_NO_SPEED = 1e-6
+# A test function may vanish twice within a step if a parabola falls to the first part of its values; further
+# ones come nearer to where it is least, while they fall to the others.
+_DIPS = (0.3, 0.97, 0.97, 0.97, 0.97, 0.97)
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that grows tenfold so often, to an asymptote, grows without bound; so does a period while the
 # parameter stands still.
@@ -350,8 +357,8 @@ class _Side:
         self.special: list[Special] = []
         self.reason, self.is_stopped, self.is_closed = "interrupted", False, False
         self.here: _Position
-        # The places before this one with the same itinerary, the latest first.
-        self.earlier: list[Place] = []
+        # The positions before this one with the same itinerary, the latest first.
+        self.earlier: list[_Position] = []
         self.start = self._position(start, direction)
         self._go_on(self.start, start)
 
@@ -373,7 +380,7 @@ class _Side:
     def _go_on(self, position: _Position, state: State) -> None:
         """Take a position as the next point of the branch."""
         is_next = self.points and self.here.curve is position.curve
-        self.earlier = [self.here.place, *self.earlier[: _EARLIER - 1]] if is_next else []
+        self.earlier = [self.here, *self.earlier[: _EARLIER - 1]] if is_next else []
         self.here = position
         value = float(position.place.w[-1])
         self.points.append(Point({self.settings.name: value}, state, position.tests))
@@ -459,7 +466,7 @@ class _Side:
         (w, scale, tangent), curve = self.start.place, self.start.curve
         if self.earlier == []:
             return None
-        places = (self.earlier[0], self.here.place)
+        places = (self.earlier[0].place, self.here.place)
         turned = (_as_unknowns_of(curve, self.here.curve, place.w, w) for place in places)
         for ends in zip(*turned, strict=True):
             before, now = ((end - w) / scale for end in ends)
@@ -471,13 +478,13 @@ class _Side:
 
     def _behind_at(self, value: float) -> State:
         """Return the state within the last step at which the parameter has a value."""
-        if not self.earlier or self.earlier[0].w[-1] == self.here.place.w[-1]:
-            return at_value(self.points[-1].state, self.settings.name, value)
         curve, place, _ = self.here
-        back = self.earlier[0]
+        if not self.earlier or self.earlier[0].place.w[-1] == place.w[-1]:
+            return at_value(self.points[-1].state, self.settings.name, value)
+        back = self.earlier[0].place
         width = float((back.w - place.w) / place.scale @ place.tangent)
         share = (value - place.w[-1]) / (back.w[-1] - place.w[-1])
-        guess = guess_through(place, self.earlier, share * width)
+        guess = guess_through(place, self._places(), share * width)
         step = _at_parameter(curve, guess, value, place.scale)
         return curve.state(step.w, step.error)
 
@@ -571,7 +578,7 @@ class _Side:
         curve, here, _ = self.here
         w, scale, tangent = here
         low, high = self.settings.bounds
-        step = corrected(curve, guess_through(here, self.earlier, ds), scale, tangent)
+        step = corrected(curve, guess_through(here, self._places(), ds), scale, tangent)
         if not low <= step.w[-1] <= high:
             bound = low if step.w[-1] < low else high
             share = (bound - w[-1]) / (step.w[-1] - w[-1])
@@ -579,22 +586,75 @@ class _Side:
         following = place_of(curve, step.w, step.jacobian, tangent)
         if following.tangent @ tangent < 0.8 and ds > 1e-4:
             raise ModelError("the branch turns too far in one step")
-        return step, self._position_at(curve, following, step.jacobian)
+        end = self._position_at(curve, following, step.jacobian)
+        return self._at_pair_of_zeros(end) or (step, end)
+
+    def _places(self) -> list[Place]:
+        return [position.place for position in self.earlier]
+
+    def _at_pair_of_zeros(self, end: _Position) -> tuple[Step, _Position] | None:
+        """Return a point between two zeros of a test function before the end of a step, if there are some.
+
+        Signs tell nothing of two zeros. A parabola through three points tells where they may be; if that
+        is before this point, the branch goes back by one point.
+        """
+        if not self.earlier:
+            return None
+        (_, here, tests), before = self.here, self.earlier[0]
+        level = float(here.w / here.scale @ here.tangent)
+        back, ahead = (float(one.place.w / here.scale @ here.tangent) - level for one in (before, end))
+        if not back < 0.0 < ahead:
+            return None
+        for key in self._wanted(before.tests, end.tests):
+            value = tests.get(key, np.nan)
+            known = [(back, before.tests[key]), (0.0, value), (ahead, end.tests[key])]
+            for share in _DIPS:
+                s = _least_between(known, share)
+                if s is None:
+                    break
+                try:
+                    step, between = self._beside(s, (before if s < 0 else end).place)
+                except ModelError:
+                    break
+                found = between.tests.get(key, np.nan)
+                if found * value < 0 and abs(found) > _NOISE:
+                    if s < 0:
+                        self._go_back()
+                    return step, between
+                known = sorted([*known, (s, found)])
+                k = known.index((s, found))
+                known = known[k - 1 : k + 2]
+        return None
+
+    def _beside(self, s: float, other: Place) -> tuple[Step, _Position]:
+        """Return the point at a distance along the tangent here, on the way to another point."""
+        curve, here, _ = self.here
+        level = float(here.w / here.scale @ here.tangent)
+        step = corrected(curve, guess_through(here, [other], s), here.scale, here.tangent, level + s)
+        place = place_of(curve, step.w, step.jacobian, here.tangent)
+        return step, self._position_at(curve, place, step.jacobian)
+
+    def _go_back(self) -> None:
+        """Leave the last point of the branch out again."""
+        self.points.pop()
+        last = len(self.points) - 1
+        self.special = [special for special in self.special if special.point < last]
+        self.here, *self.earlier = self.earlier
 
     def _accept(self, step: Step, following: _Position) -> bool:
         """Take a point; find what changes before it. False: the branch ends."""
         if self._is_single_again(following):
             return False
         before, after = self.here.tests, following.tests
-        wanted = {*CHANGES, *self.settings.detect}
-        common = [key for key in after if key in before and key[0] in wanted]
         # What vanishes along a whole branch has no sign.
         changed = [
             key
-            for key in common
+            for key in self._wanted(before, after)
             if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > _NOISE
         ]
-        found = sorted((self._located(self.here, key, following) for key in changed), key=lambda at: at[0])
+        places = (self._located(self.here, key, following) for key in changed)
+        # What vanishes together with a change of the itinerary comes before it.
+        found = sorted(places, key=lambda at: at[0] + (_TOGETHER if at[1][0] in CHANGES else 0.0))
         curve = self.here.curve
         for _, key, located in found:
             state = curve.state(located.w, located.error)
@@ -617,6 +677,11 @@ class _Side:
             following, state = self._finer(following, finer), finer
         self._go_on(following, state)
         return True
+
+    def _wanted(self, before: dict[Any, float], after: dict[Any, float]) -> list[Any]:
+        """Return the keys of the test functions to look at that are known at two points."""
+        wanted = {*CHANGES, *self.settings.detect}
+        return [key for key in after if key in before and key[0] in wanted]
 
     def _finer(self, position: _Position, cycle: Cycle) -> _Position:
         """Return the position of a cycle divided into more parts, in the same direction along the branch."""
@@ -843,6 +908,32 @@ class _Side:
         return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
 
 
+def _least_between(known: Sequence[tuple[float, float]], share: float) -> float | None:
+    """Return where a function may vanish twice that has the same sign at three places, by their values.
+
+    It is the least magnitude of the parabola through the three, if that is below a share of the values.
+
+    Examples
+    --------
+    >>> _least_between([(-1.0, 4.0), (0.0, 1.0), (1.0, 0.0004)], 0.3)
+    >>> _least_between([(-1.0, 2.24), (0.0, 0.24), (2.0, 2.24)], 0.3)
+    0.5
+    """
+    (back, first), (here, middle), (ahead, last) = known
+    if not (first * middle > 0 and middle * last > 0):
+        return None
+    slopes = (middle - first) / (here - back), (last - middle) / (ahead - here)
+    bend = (slopes[1] - slopes[0]) / (ahead - back)
+    if bend * middle <= 0:
+        return None
+    rate = slopes[0] + (here - back) * bend
+    s = -0.5 * rate / bend
+    least = middle + 0.5 * rate * s
+    near = min(abs(v) for _, v in known)
+    is_within = back < here + s < ahead and s != 0.0
+    return here + s if is_within and least * np.sign(middle) < share * near else None
+
+
 def _way_from(special: Special, place: Place, first: State) -> float:
     """Return 1.0 if the tangent at a state leads on from a special point, -1.0 if back, 0.0 if unknown.
 
@@ -965,6 +1056,9 @@ def _is_real(key: Any, state: State) -> bool:
     if code == "HB":
         assert isinstance(state, Equilibrium)
         return _has_critical_pair(state)
+    if code == "PH":
+        assert isinstance(state, Equilibrium)
+        return abs(state._curve.speed_away(state._w)) < _NO_SPEED
     if not isinstance(state, Cycle):
         return True
     values = state.nontrivial

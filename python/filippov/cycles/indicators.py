@@ -94,6 +94,8 @@ def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
 
 def _of_equilibrium(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
     found = boundaries_of(curve, w)
+    if curve.sliding:
+        found["PH",] = -curve.speed_away(w)
     values = spectrum_of(curve, w)
     if values is None:
         return found

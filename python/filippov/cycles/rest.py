@@ -119,13 +119,8 @@ class Equilibrium:
 
     @cached_property
     def _most_beside(self) -> float:
-        """The largest real part of what leads away from its surfaces."""
-        if not self._curve.sliding:
-            return -1.0
-        if len(self._curve.sliding) == 2 and np.all(np.abs(self.multipliers) < 1.0):
-            most = speed_away(self._curve.normal_velocities(self._w))
-            return 0.0 if abs(most) <= _ROUNDING else most
-        return _largest_real_part(np.linalg.eigvals(self._curve.normal_rates(self._w)))
+        """How fast motions beside its surfaces go away from them."""
+        return self._curve.speed_away(self._w) if self._curve.sliding else -1.0
 
     @property
     def is_stable(self) -> bool:
@@ -311,6 +306,14 @@ class EquilibriumCurve:
             velocity = self.motions.right_hand_side(0.0, w[: self.n], signs)[: self.n]
             found[tuple(corner.astype(int).tolist())] = normals @ velocity
         return found
+
+    def speed_away(self, w: Array) -> float:
+        """Return how fast motions beside the surfaces slid on go away from them: not at all if negative."""
+        multipliers = w[self.n : self.n_unknowns]
+        if len(self.sliding) == 2 and np.all(np.abs(multipliers) < 1.0):
+            most = speed_away(self.normal_velocities(w))
+            return 0.0 if abs(most) <= _ROUNDING else most
+        return _largest_real_part(np.linalg.eigvals(self.normal_rates(w)))
 
     def _by_unknowns(self, w: Array) -> Array:
         """Return the derivatives by states and multipliers, (n + m, n + m), exact if the graph has them."""

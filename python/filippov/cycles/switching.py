@@ -50,6 +50,7 @@ def other_branch(special: Special, name: str, size: float) -> State:
         raise InputError(
             f"start: other branches begin at PD, BP, BE and HB, not at {special.code}; a curve in two "
             "parameters is followed with two names, and a state with branch.at(...)"
+            + ("; the cycles that begin at PH are found by a run beside it" if special.code == "PH" else "")
         )
     if not isinstance(state, Cycle):
         raise InputError("start: other branches of equilibria begin at BE and HB")

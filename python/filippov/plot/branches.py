@@ -30,7 +30,7 @@ _VIRTUAL = "not followed by the flow"
 # A marker for each kind of special point: smooth bifurcations, boundaries, sliding, resets, monitors.
 _MARKERS = {
     "o": ("LP", "PD", "NS", "BP", "HB"),
-    "s": ("PSN", "BE", "TF"),
+    "s": ("PSN", "PH", "BE", "TF"),
     "D": ("CS", "GS", "SS", "AS", "CO"),
     "^": ("GR",),
     "x": ("UZ",),
