@@ -26,7 +26,10 @@ __all__ = ["SHORT", "back_from_change", "beyond_change", "distance_from", "flow_
 
 _REACHES = (1.0, 3.0, 0.3, 0.1)
 _LENGTHS = (1e-3, 3e-3, 1e-2, 3e-4, 1e-4, 1e-5)
-SHORT, _PLACES = 0.05, 64
+SHORT = 0.05
+# The phases at which a cycle is compared with a point, then those around the nearest one, finer and finer.
+_PLACES, _AROUND = 64, np.linspace(-1.0, 1.0, 33)
+_WIDTHS = tuple(1.5 / _PLACES * (1.5 / 16) ** k for k in range(4))
 
 
 def beyond_change(curve: CycleCurve, located: Step, beyond: Array) -> Cycle | None:
@@ -108,7 +111,8 @@ def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
 
 def distance_from(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
     """Return how far a cycle is from a point of a curve, in the middles of its legs and by its size."""
-    points = np.array([cycle.at(cycle.t0 + cycle.period * k / _PLACES) for k in range(_PLACES)])
+    phases = np.arange(_PLACES) / _PLACES
+    points = np.array([cycle.at(cycle.t0 + cycle.period * phase) for phase in phases])
     size = np.ptp(points, axis=0) + 1e-300
     middles = _middles(curve, w)
     period = sum(duration for duration, _, _ in middles)
@@ -116,16 +120,23 @@ def distance_from(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
     for duration, t, x in middles:
         if duration < SHORT * period:
             continue
-        off = (points - x) / size
         if cycle.is_forced:
             found = max(found, float(np.max(np.abs(cycle.at(t) - x) / size)))
             continue
-        k = int(np.argmin(np.max(np.abs(off), axis=1)))
-        # The distance from the nearest chord: the points are not dense.
-        chord = (points[(k + 1) % _PLACES] - points[k - 1]) / size
-        across = off[k] - chord * (chord @ off[k]) / max(float(chord @ chord), 1e-300)
-        found = max(found, float(np.max(np.abs(across))))
+        nearest, phase = _nearest(points, phases, x, size)
+        for width in _WIDTHS:
+            around = phase + width * _AROUND
+            finer = np.array([cycle.at(cycle.t0 + cycle.period * (one % 1.0)) for one in around])
+            nearest, phase = _nearest(finer, around, x, size)
+        found = max(found, nearest)
     return found
+
+
+def _nearest(points: Array, phases: Array, x: Array, size: Array) -> tuple[float, float]:
+    """Return how far a state is from the nearest of some points of a cycle, and the phase of that."""
+    away = np.max(np.abs(points - x) / size, axis=1)
+    k = int(np.argmin(away))
+    return float(away[k]), float(phases[k])
 
 
 def back_from_change(curve: CycleCurve, key: Any, located: Step) -> tuple[Cycle, float] | None:
