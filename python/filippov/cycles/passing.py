@@ -223,10 +223,12 @@ def _turned(itinerary: Itinerary, first: int) -> Itinerary:
 def _without_end(curve: CycleCurve, end: int, w: Array) -> Itinerary | None:
     """Return the itinerary without what happens at the end of a leg."""
     itinerary = curve.shooting.itinerary(w[: curve.n_unknowns])
-    following = (end + 1) % len(itinerary.legs)
     if len(itinerary.legs) == 1:
         return itinerary._replace(legs=(itinerary.legs[0]._replace(ending=None),))
-    if itinerary.legs[end].mode != itinerary.legs[following].mode or following < end:
+    if end + 1 == len(itinerary.legs):
+        itinerary, end = _turned(itinerary, 1), end - 1
+    following = end + 1
+    if itinerary.legs[end].mode != itinerary.legs[following].mode:
         return None
     kept = [k for k in range(len(itinerary.legs)) if k != end]
     both = itinerary.durations[end] + itinerary.durations[following]

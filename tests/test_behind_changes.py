@@ -1,0 +1,65 @@
+"""The cycle behind a change of itinerary, where it is near in time or where the change closes the period."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def assert_cycles_close(branch: fl.Branch, every: int) -> None:
+    for point in branch.points[::every]:
+        cycle = point.state
+        if np.max(np.abs(cycle.multipliers)) > 50:
+            continue
+        start, end = cycle.t0 + 0.37 * cycle.period, cycle.t0 + 1.37 * cycle.period
+        run = cycle.system.solve((start, end), cycle.at(start), rtol=1e-10, atol=1e-12, **cycle.params)
+        np.testing.assert_allclose(run.y[:, -1], cycle.at(start), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("r", "w", "z", "g", "grazing"),
+    [
+        (0.7441101989488719, 0.7209229461007167, 0.13020067313309605, 0.5917601881423113, 1.21989731916),
+        (0.545950973458958, 0.9131518136743711, 0.12631738904975479, 0.17665771314314904, 1.47682309147),
+    ],
+)
+def test_an_impact_fades_at_the_end_of_the_period(
+    r: float, w: float, z: float, g: float, grazing: float
+) -> None:
+    # The cycle with two impacts folds, and loses the one with which its period is closed.
+    wall = fl.Reset(lambda t, x, p: x[0] - g * p, lambda t, x: [x[0], -r * x[1]], direction="up")
+
+    def field(t: Any, x: Any, p: Any = 1.0) -> Any:
+        return [x[1], -x[0] - 2 * z * x[1] + np.cos(w * t)]
+
+    system = fl.System(field, n=2, resets=wall)
+    branch = fl.continuation(fl.limit_cycle(system, [g - 1, 0]), "p", (0.6, 1.7))
+    assert [special.code for special in branch.special] == ["EP", "LP", "GR", "EP"]
+    assert abs(branch.special["GR"][0].params["p"] - grazing) < 1e-9
+    n_impacts = [
+        sum(bool(leg.ending and leg.ending.acts) for leg in p.state.itinerary.legs) for p in branch.points
+    ]
+    assert n_impacts[0] == n_impacts[-1] + 1
+    assert_cycles_close(branch, 6)
+
+
+def test_a_cycle_a_little_way_off_its_surfaces() -> None:
+    # The step behind the change is far shorter than the chords between 64 points of the cycle.
+    a, b, c, d, e, m = -0.75534535, -0.32942472, 0.42918255, 0.28872023, -0.98537975, 0.900170845072022
+
+    def field(t: Any, x: Any, p: Any = 1.0) -> Any:
+        return [
+            x[1] + a * np.sign(x[0] - c),
+            m * p * (1 - x[0] ** 2) * x[1]
+            - x[0]
+            + b * np.sign(x[1] - d * p)
+            + e * np.where(x[0] + x[1] > 0.3, 1, 0),
+        ]
+
+    branch = fl.continuation(fl.limit_cycle(fl.System(field, n=2), [1.25, 0.06]), "p", (0.5, 2.0))
+    assert branch.reasons["above"] == "p = 2 is the end of the range"
+    assert np.min(np.abs([point.params["p"] - 1.615987 for point in branch.special["SS"]])) < 1e-5
+    assert_cycles_close(branch, 8)
