@@ -63,3 +63,32 @@ def test_a_cycle_a_little_way_off_its_surfaces() -> None:
     assert branch.reasons["above"] == "p = 2 is the end of the range"
     assert np.min(np.abs([point.params["p"] - 1.615987 for point in branch.special["SS"]])) < 1e-5
     assert_cycles_close(branch, 8)
+
+
+def test_a_cycle_shrinks_to_a_boundary_equilibrium() -> None:
+    # A continuous system: the cycle is as large as mu.
+    def field(t: Any, x: Any, mu: Any = 0.5) -> Any:
+        return [np.where(x[0] < 0, 0.6 * x[0], -0.8 * x[0]) - x[1], x[0] + mu]
+
+    branch = fl.continuation(fl.limit_cycle(fl.System(field, n=2), [0.5, 0.1]), "mu", (-1, 1))
+    assert branch.reasons["below"] == "the cycle shrinks to an equilibrium at mu = 0"
+    assert [special.code for special in branch.special] == ["EP"]
+    assert np.all(branch.values("mu") > 0)
+
+
+def test_the_curve_of_folds_ends_at_a_generalised_hopf_point() -> None:
+    # r' = r (b1 + b2 r^2 - r^4): folds for b2^2 = -4 b1, at r^2 = b2 / 2.
+    def field(t: Any, x: Any, b1: Any = -0.5, b2: Any = 1.0) -> Any:
+        r = x[0] ** 2 + x[1] ** 2
+        k = b1 + b2 * r - r * r
+        return [k * x[0] - x[1], x[0] + k * x[1]]
+
+    system = fl.System(field, n=2)
+    (hopf,) = fl.continuation(fl.equilibrium(system, [0, 0]), "b1", (-1, 1)).special["HB"]
+    fold = fl.continuation(hopf, "b1", (-1, 1)).special["LP"][0]
+    curve = fl.continuation(fold, ("b1", "b2"), {"b1": (-1, 1), "b2": (-2, 2)})
+    b1, b2 = curve.values("b1"), curve.values("b2")
+    np.testing.assert_allclose(b2**2, -4 * b1, atol=1e-8)
+    assert np.all(b2 > 0)
+    assert b2.min() < 0.01
+    assert "the cycle shrinks to an equilibrium" in curve.reasons["one way"]

@@ -16,7 +16,7 @@ from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.codimension_two import CODIMENSION_TWO, ENDS, POLES
 from filippov.cycles.conditions import PROBES, Condition, condition_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.following import AnyCurve, bounds_of, curve_of
+from filippov.cycles.following import AnyCurve, bounds_of, curve_of, shrinks_to_point
 from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
@@ -216,6 +216,11 @@ class _CurveSide:
                 continue
             self.w, self.tangent = point.w, tangent
             self._keep(point, tests)
+            if shrinks_to_point([point.state for point in self.points]):
+                self.points.pop()
+                where = self._where(self.trail[-2][0])
+                self.reason = f"the cycle shrinks to an equilibrium, a generalised Hopf point, behind {where}"
+                return
             for name, value, (low, high) in zip(self.names, self.w[-2:], self.ranges, strict=True):
                 if not low < value < high:
                     self.reason = f"{name} = {value:g} is the end of its range"

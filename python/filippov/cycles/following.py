@@ -38,7 +38,7 @@ from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import count, positive
 
-__all__ = ["at_value", "continuation"]
+__all__ = ["at_value", "bounds_of", "continuation", "curve_of", "shrinks_to_point"]
 
 AnyCurve = CycleCurve | EquilibriumCurve
 
@@ -58,6 +58,8 @@ _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that grows tenfold so often, to an asymptote, grows without bound; so does a period while the
 # parameter stands still.
 _TENFOLDS, _STANDS = 4, 1e-8
+# A cycle whose size is such a part of that of the first one is an equilibrium.
+_SHRUNK = 1e-6
 # How far, by its size, a cycle is another one.
 _JUMPS = 0.2
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
@@ -490,18 +492,7 @@ class _Side:
 
     def _vanishes(self) -> bool:
         """Whether a cycle without switches has shrunk to an equilibrium, where its branch ends."""
-        spans = []
-        for point in self.points[-2:]:
-            state = point.state
-            if not isinstance(state, Cycle) or state.is_forced or len(state.itinerary.legs) > 1:
-                return False
-            spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
-        if len(spans) < 2:
-            return False
-        first = self.points[0].state
-        assert isinstance(first, Cycle)
-        size = np.linalg.norm(first.at(first.t0 + 0.5 * first.period) - first.y0)
-        if spans[0] @ spans[1] > 0 and np.linalg.norm(spans[1]) > 1e-3 * size:
+        if not shrinks_to_point([point.state for point in self.points]):
             return False
         self.points.pop()
         value = self.points[-1].params[self.settings.name]
@@ -511,6 +502,13 @@ class _Side:
         ]
         self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
         return True
+
+    def _has_shrunk(self, state: State) -> bool:
+        """Whether a cycle is a point beside the first one of the branch, as at a boundary equilibrium."""
+        first = self.points[0].state
+        if not isinstance(state, Cycle) or not isinstance(first, Cycle):
+            return False
+        return _extent(state) < _SHRUNK * _extent(first)
 
     def _grows(self) -> bool:
         """Whether the cycle, or its period, grows without bound: the parameter comes to a limit."""
@@ -661,6 +659,11 @@ class _Side:
             if key[0] in CHANGES and self.settings.switch != "ignore":
                 if before[key] < 0:
                     continue  # it becomes possible again: the flow does not follow it yet
+                if self._has_shrunk(state):
+                    value = state.params[self.settings.name]
+                    value = 0.0 if abs(value) < _NOISE * self.settings.size else value
+                    self.reason = f"the cycle shrinks to an equilibrium at {self.settings.name} = {value:.9g}"
+                    return False
                 self._add(key[0], key, curve, state)
                 if self.settings.switch == "stop":
                     self.reason = f"{self.special[-1]!r}"
@@ -955,6 +958,31 @@ def _summary(curve: AnyCurve, place: Place) -> Array:
     tangent = place.tangent
     n, m = curve.shooting.n, curve.shooting.m
     return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])
+
+
+def shrinks_to_point(states: Sequence[State]) -> bool:
+    """Whether the last of the states along a curve, cycles without switches, lie around a cycle of no size.
+
+    Behind it the curve comes back with cycles turned inside out.
+    """
+    first, ends = states[0], states[-2:]
+    spans = []
+    for state in (first, *ends):
+        if not isinstance(state, Cycle) or state.is_forced:
+            return False
+        if state is not first and len(state.itinerary.legs) > 1:
+            return False
+        spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
+    if len(ends) < 2:
+        return False
+    return bool(
+        spans[1] @ spans[2] <= 0 or np.linalg.norm(spans[2]) <= 1e-3 * float(np.linalg.norm(spans[0]))
+    )
+
+
+def _extent(cycle: Cycle) -> float:
+    phases = np.arange(_PHASES) / _PHASES
+    return float(np.max(np.ptp([cycle.at(cycle.t0 + phase * cycle.period) for phase in phases], axis=0)))
 
 
 def _size_of(cycle: Cycle) -> float:
