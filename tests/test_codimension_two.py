@@ -289,3 +289,25 @@ def test_curves_start_at_points_of_codimension_one() -> None:
     ranges = {"a": (-1, 1), "b": (-1, 1)}
     with pytest.raises(fl.InputError, match=r"start: .* not of CP"):
         fl.continuation(curve.special["CP"][0], BOTH, ranges)
+
+
+@pytest.mark.parametrize("start", ["region", "surface"])
+def test_a_curve_of_boundary_equilibria_knows_both_sides(start: str) -> None:
+    # Beside y = 0 rest is where x - mu + (x + mu / 2)(k + 0.4 x) = 0: it folds at the boundary for k = -1.
+    def field(t: Any, x: Any, mu: Any = 0.4, k: Any = -0.5) -> Any:
+        up = (1 + np.sign(x[1])) / 2
+        below = [-x[0] + x[1] + mu, -x[0] - 0.5 * (x[1] + mu)]
+        above = [k + 0.4 * x[0], -1.0]
+        return [below[i] * (1 - up) + above[i] * up for i in (0, 1)]
+
+    system = fl.System(field, n=2)
+    if start == "region":
+        rest = fl.equilibrium(system, [0, -0.4])
+    else:
+        rest = fl.equilibrium(system, [-0.05, 0], {"mu": -0.05}, mode="0")
+    (point,) = fl.continuation(rest, "mu", (-1, 1)).special["BE"]
+    curve = fl.continuation(point, ("mu", "k"), {"mu": (-1, 1), "k": (-3, 3)})
+    (fold,) = curve.special
+    assert fold.code == "PSN"
+    np.testing.assert_allclose([fold.params["mu"], fold.params["k"]], [0, -1], atol=1e-9)
+    assert str(fold.state.mode) == "0"

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from filippov.cycles.arclength import Step
-from filippov.cycles.branch import Special
+from filippov.cycles.branch import Special, State
 from filippov.cycles.codimension_two import (
     POLES,
     CriticalPair,
@@ -37,6 +37,8 @@ __all__ = ["PROBES", "Condition", "condition_of"]
 # These are told by a test function of an itinerary.
 PROBES = ("CS", "SS", "GS", "AS", "GR", "CO", "TF")
 _SPECTRAL = ("LP", "PSN", "PD", "NS", "HB")
+# Test functions of the equilibrium in the mode behind its boundary end with this.
+_OTHER = "other"
 
 
 class Condition(Protocol):
@@ -56,6 +58,9 @@ class Condition(Protocol):
 
     def is_genuine(self, code: str, w: Array) -> bool:
         """Whether what vanishes beside it is what its code says."""
+
+    def state(self, key: Any, point: Step) -> State:
+        """Return the state at a point, as what vanishes there is about it."""
 
     def keep(self, point: Step) -> None:
         """Take a point of the curve as that near which the next one is."""
@@ -113,6 +118,9 @@ class _ProbeCondition:
     def beside(self, point: Step, tangent: Array) -> Tests:
         return {("CP",): self._local(self._place(point.w))[1]}
 
+    def state(self, key: Any, point: Step) -> State:
+        return self.curve.state(point.w, point.error)
+
     def is_genuine(self, code: str, w: Array) -> bool:
         return True
 
@@ -152,15 +160,44 @@ class _BoundaryCondition:
         return _slopes(self.value, self.curve, w)
 
     def beside(self, point: Step, tangent: Array) -> Tests:
-        if self.key[0] == "PH" and isinstance(self.curve, EquilibriumCurve):
-            return boundaries_of(self.curve, point.w)  # the eigenvalues are infinite
-        return singular_values_of(self.curve, point.w)
+        curve, w = self.curve, point.w
+        if not isinstance(curve, EquilibriumCurve):
+            return singular_values_of(curve, w)
+        if self.key[0] == "PH":
+            return boundaries_of(curve, w)  # the eigenvalues are infinite
+        other, its = _in_other_mode(curve, self.key, w)
+        beyond = singular_values_of(other, its).items()
+        found = {(*key, _OTHER): value for key, value in beyond if key[0] != "BE"}
+        return {**singular_values_of(curve, w), **found}
+
+    def state(self, key: Any, point: Step) -> State:
+        if key[-1] == _OTHER and isinstance(self.curve, EquilibriumCurve):
+            other, its = _in_other_mode(self.curve, self.key, point.w)
+            return other.state(its, point.error)
+        return self.curve.state(point.w, point.error)
 
     def is_genuine(self, code: str, w: Array) -> bool:
         return True
 
     def keep(self, point: Step) -> None:
         pass
+
+
+def _in_other_mode(curve: EquilibriumCurve, key: tuple[Any, ...], w: Array) -> tuple[EquilibriumCurve, Array]:
+    """Return the equations of a boundary equilibrium in the mode behind the boundary, and the same point."""
+    _, surface, end = key
+    mode, n = list(curve.mode), curve.n
+    own = dict(zip(curve.sliding, w[n : curve.n_unknowns].tolist(), strict=True))
+    if end == 0:  # it reaches the surface: the multiplier is its side
+        own[surface] = float(mode[surface])
+        mode[surface] = 0
+    else:
+        del own[surface]
+        mode[surface] = end
+    other = EquilibriumCurve(curve.motions, mode, curve.names, curve.sizes.tolist())
+    other.sizes_of_states = curve.sizes_of_states
+    multipliers = [own[j] for j in other.sliding]
+    return other, np.concatenate([w[:n], multipliers, w[curve.n_unknowns :]])
 
 
 class _SpectralCondition:
@@ -212,6 +249,9 @@ class _SpectralCondition:
         if self._pair is not None:
             return code not in ("HH", "NSNS") or has_complex(self._pair.others(values))
         return code not in ("ZH", "LPNS", "PDNS") or has_complex(values)
+
+    def state(self, key: Any, point: Step) -> State:
+        return self.curve.state(point.w, point.error)
 
     def keep(self, point: Step) -> None:
         if self._pair is not None:

@@ -287,7 +287,7 @@ class _CurveSide:
                 continue
             code, kind = key[0], _kind(key, self.code)
             params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
-            state = self.extended.curve.state(there.w, there.error)
+            state = self.extended.condition.state(key, there)
             special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
             if not _is_unit(code, state) or not self.extended.condition.is_genuine(code, there.w):
                 continue
