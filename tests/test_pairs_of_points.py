@@ -69,3 +69,17 @@ def test_two_period_doublings(apart: float) -> None:
     system = fl.System(lambda t, x, r=2.6: [0.0 * x[0], 0.0 * x[1]], n=2, resets=resets)
     branch = fl.continuation(fl.limit_cycle(system, [0.6, 0.6]), "r", (2.0, 3.9))
     np.testing.assert_allclose(found(branch, "r", "PD"), [3, 3 + apart], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("apart", [0.004, 0.03, 0.1])
+def test_two_generalised_hopf_points(apart: float) -> None:
+    def field(t: Any, z: Any, b1: Any = -0.5, b2: Any = -0.6) -> Any:
+        x = [z[0] - 1, z[1] - 1]
+        r = x[0] ** 2 + x[1] ** 2
+        k = b1 + (b2 - 0.3) * (b2 - 0.3 - apart) * r - r * r
+        return [k * x[0] - x[1], x[0] + k * x[1]]
+
+    system = fl.System(field, n=2)
+    (hopf,) = fl.continuation(fl.equilibrium(system, [1, 1]), "b1", (-1, 1)).special["HB"]
+    curve = fl.continuation(hopf, ("b1", "b2"), {"b1": (-1, 1), "b2": (-2, 2)})
+    np.testing.assert_allclose(found(curve, "b2", "GH"), [0.3, 0.3 + apart], rtol=0, atol=1e-6)

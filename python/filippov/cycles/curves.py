@@ -7,7 +7,7 @@ chapter 8.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from filippov.cycles.following import AnyCurve, bounds_of, curve_of, shrinks_to_
 from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
-from filippov.cycles.zero import zero_between
+from filippov.cycles.zero import pair_between, zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import positive
@@ -131,6 +131,14 @@ class OnCurve:
         return curve.state(point.w, point.error)
 
 
+class _Passed(NamedTuple):
+    """A point of a curve: the unknowns, the direction in scaled unknowns, and the test functions."""
+
+    w: Array
+    tangent: Array
+    tests: dict[Any, float]
+
+
 class _CurveSide:
     """One direction of a curve."""
 
@@ -160,7 +168,7 @@ class _CurveSide:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason = ""
-        self.trail: list[tuple[Array, dict[Any, float]]] = []
+        self.trail: list[_Passed] = []
         # Symmetric cycles meet their condition in several places.
         alike = self._tests(point, ())
         self.together = {key for key, value in alike.items() if abs(value) < 1e-7}
@@ -190,7 +198,7 @@ class _CurveSide:
         if isinstance(self.extended.curve, CycleCurve):
             self.extended.curve.remember(point.w)
         self.tests = self._tests(point) if tests is None else tests
-        self.trail.append((self.w, self.tests))
+        self.trail.append(_Passed(self.w, self.tangent, self.tests))
         params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
         state = self.extended.curve.state(self.w, point.error)
         self.points.append(Point(params, state, self.tests))
@@ -202,8 +210,7 @@ class _CurveSide:
         while len(self.points) < most:
             try:
                 point, tangent = self._step(ds)
-                # What is zero within rounding keeps its sign.
-                tests = {key: value or self.tests.get(key, 0.0) for key, value in self._tests(point).items()}
+                point, tangent, tests = self._at_pair_of_zeros(point, tangent)
                 lost = [key for key in tests if key in self.tests and tests[key] * self.tests[key] < 0]
                 if lost and not self._pass(lost, point, tests):
                     return
@@ -218,7 +225,7 @@ class _CurveSide:
             self._keep(point, tests)
             if shrinks_to_point([point.state for point in self.points]):
                 self.points.pop()
-                where = self._where(self.trail[-2][0])
+                where = self._where(self.trail[-2].w)
                 self.reason = f"the cycle shrinks to an equilibrium, a generalised Hopf point, behind {where}"
                 return
             for name, value, (low, high) in zip(self.names, self.w[-2:], self.ranges, strict=True):
@@ -227,6 +234,54 @@ class _CurveSide:
                     return
             ds = min(ds * (1.5 if point.n_steps <= 3 else 1.0), _LONGEST_STEP)
         self.reason = f"{most} points"
+
+    def _signed(self, point: Step) -> dict[Any, float]:
+        """Return the test functions; what is zero within rounding keeps its sign."""
+        return {key: value or self.tests.get(key, 0.0) for key, value in self._tests(point).items()}
+
+    def _at_pair_of_zeros(self, point: Step, tangent: Array) -> tuple[Step, Array, dict[Any, float]]:
+        """Return the next point, or one between two zeros of a test function before it, if there are some.
+
+        If these are before the point here, the curve goes back by one point.
+        """
+        tests = self._signed(point)
+        if len(self.trail) < 2:
+            return point, tangent, tests
+        before, scale = self.trail[-2], self.extended.scales(self.w)
+        level = float(self.w / scale @ self.tangent)
+        back, ahead = (float(w / scale @ self.tangent) - level for w in (before.w, point.w))
+        if not back < 0.0 < ahead:
+            return point, tangent, tests
+        for key in tests:
+            if key not in before.tests or key not in self.tests:
+                continue
+            known = [(back, before.tests[key]), (0.0, self.tests[key]), (ahead, tests[key])]
+            seen: dict[float, Step] = {}
+
+            def value(s: float, key: Any = key, seen: Any = seen) -> float:
+                end, length = (before.w, back) if s < 0 else (point.w, ahead)
+                guess = self.w + (s / length) * (end - self.w)
+                seen[s] = corrected(self.extended, guess, scale, self.tangent, level + s)
+                return self._tests(seen[s]).get(key, np.nan)
+
+            try:
+                s = pair_between(value, known)
+            except ModelError:
+                continue
+            if s is not None:
+                own = tangent_of(seen[s].jacobian, self.extended.scales(seen[s].w), self.tangent)
+                if s < 0:
+                    self._go_back()
+                return seen[s], own, self._signed(seen[s])
+        return point, tangent, tests
+
+    def _go_back(self) -> None:
+        """Leave the last point of the curve out again."""
+        self.points.pop()
+        self.trail.pop()
+        last = len(self.points) - 1
+        self.special = [special for special in self.special if special.point < last]
+        self.w, self.tangent, self.tests = self.trail[-1]
 
     def _ends_nearby(self) -> bool:
         """Whether more vanishes just ahead, where the equations are singular too."""
@@ -249,7 +304,7 @@ class _CurveSide:
         for key in self.tests:
             if key[0] not in (*PROBES, "LP", "PD") and not self._is_degenerate(key):
                 continue
-            trail = [(w, tests[key]) for w, tests in self.trail if key in tests]
+            trail = [(w, tests[key]) for w, _, tests in self.trail if key in tests]
             w = _zero_ahead(trail)
             if w is not None and (w - self.w) / scale @ self.tangent > 0:
                 found.append((float(np.linalg.norm((w - self.w) / scale)), key, w))

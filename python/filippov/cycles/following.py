@@ -33,7 +33,7 @@ from filippov.cycles.passing import (
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.shooting import scales
 from filippov.cycles.switching import single_at_doubling
-from filippov.cycles.zero import zero_between
+from filippov.cycles.zero import pair_between, zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import count, positive
@@ -51,9 +51,6 @@ _WIDTH = 1e-13
 _TOGETHER = 1e-9
 # Motions that go away from a surface no faster stay beside it; at a pole of the speed it is larger.
 _NO_SPEED = 1e-6
-# A test function may vanish twice within a step if a parabola falls to the first part of its values; further
-# ones come nearer to where it is least, while they fall to the others.
-_DIPS = (0.3, 0.97, 0.97, 0.97, 0.97, 0.97)
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
 # A cycle that grows tenfold so often, to an asymptote, grows without bound; so does a period while the
 # parameter stands still.
@@ -604,24 +601,22 @@ class _Side:
         if not back < 0.0 < ahead:
             return None
         for key in self._wanted(before.tests, end.tests):
-            value = tests.get(key, np.nan)
-            known = [(back, before.tests[key]), (0.0, value), (ahead, end.tests[key])]
-            for share in _DIPS:
-                s = _least_between(known, share)
-                if s is None:
-                    break
-                try:
-                    step, between = self._beside(s, (before if s < 0 else end).place)
-                except ModelError:
-                    break
-                found = between.tests.get(key, np.nan)
-                if found * value < 0 and abs(found) > _NOISE:
-                    if s < 0:
-                        self._go_back()
-                    return step, between
-                known = sorted([*known, (s, found)])
-                k = known.index((s, found))
-                known = known[k - 1 : k + 2]
+            known = [(back, before.tests[key]), (0.0, tests.get(key, np.nan)), (ahead, end.tests[key])]
+            seen: dict[float, tuple[Step, _Position]] = {}
+
+            def value(s: float, key: Any = key, seen: Any = seen) -> float:
+                seen[s] = self._beside(s, (before if s < 0 else end).place)
+                found: float = seen[s][1].tests.get(key, np.nan)
+                return found if abs(found) > _NOISE else 0.0
+
+            try:
+                s = pair_between(value, known)
+            except ModelError:
+                continue
+            if s is not None:
+                if s < 0:
+                    self._go_back()
+                return seen[s]
         return None
 
     def _beside(self, s: float, other: Place) -> tuple[Step, _Position]:
@@ -909,32 +904,6 @@ class _Side:
     def _why_it_ended(self, error: ModelError) -> str:
         name, value = self.settings.name, float(self.here.place.w[-1])
         return f"the branch cannot be followed beyond {name} = {value:.9g}: {error}"
-
-
-def _least_between(known: Sequence[tuple[float, float]], share: float) -> float | None:
-    """Return where a function may vanish twice that has the same sign at three places, by their values.
-
-    It is the least magnitude of the parabola through the three, if that is below a share of the values.
-
-    Examples
-    --------
-    >>> _least_between([(-1.0, 4.0), (0.0, 1.0), (1.0, 0.0004)], 0.3)
-    >>> _least_between([(-1.0, 2.24), (0.0, 0.24), (2.0, 2.24)], 0.3)
-    0.5
-    """
-    (back, first), (here, middle), (ahead, last) = known
-    if not (first * middle > 0 and middle * last > 0):
-        return None
-    slopes = (middle - first) / (here - back), (last - middle) / (ahead - here)
-    bend = (slopes[1] - slopes[0]) / (ahead - back)
-    if bend * middle <= 0:
-        return None
-    rate = slopes[0] + (here - back) * bend
-    s = -0.5 * rate / bend
-    least = middle + 0.5 * rate * s
-    near = min(abs(v) for _, v in known)
-    is_within = back < here + s < ahead and s != 0.0
-    return here + s if is_within and least * np.sign(middle) < share * near else None
 
 
 def _way_from(special: Special, place: Place, first: State) -> float:
