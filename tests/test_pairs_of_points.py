@@ -72,14 +72,15 @@ def test_two_period_doublings(apart: float) -> None:
 
 
 @pytest.mark.parametrize("apart", [0.004, 0.03, 0.1])
-def test_two_generalised_hopf_points(apart: float) -> None:
+@pytest.mark.parametrize("centre", [0, 1])
+def test_two_generalised_hopf_points(apart: float, centre: float) -> None:
     def field(t: Any, z: Any, b1: Any = -0.5, b2: Any = -0.6) -> Any:
-        x = [z[0] - 1, z[1] - 1]
+        x = [z[0] - centre, z[1] - centre]
         r = x[0] ** 2 + x[1] ** 2
         k = b1 + (b2 - 0.3) * (b2 - 0.3 - apart) * r - r * r
         return [k * x[0] - x[1], x[0] + k * x[1]]
 
     system = fl.System(field, n=2)
-    (hopf,) = fl.continuation(fl.equilibrium(system, [1, 1]), "b1", (-1, 1)).special["HB"]
+    (hopf,) = fl.continuation(fl.equilibrium(system, [centre, centre]), "b1", (-1, 1)).special["HB"]
     curve = fl.continuation(hopf, ("b1", "b2"), {"b1": (-1, 1), "b2": (-2, 2)})
-    np.testing.assert_allclose(found(curve, "b2", "GH"), [0.3, 0.3 + apart], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found(curve, "b2", "GH"), [0.3, 0.3 + apart], rtol=0, atol=1e-8)

@@ -32,6 +32,8 @@ _DEFECTIVE = 1e-6
 _HERE = np.zeros(1)
 # Differences over one, two and three widths.
 _WIDTH = 0.03
+# They are wider where the motion is linear so many times further than the size of its states, up to a limit.
+_FAR, _FARTHEST = 10.0, 1e3
 _FIRST, _SECOND = np.array([0.75, -0.15, 1 / 60]), np.array([1.5, -0.15, 1 / 90])
 # Newton's method between the legs of a return, and on surfaces; a step along the motion on these.
 _ARRIVED, _MOST_STEPS, _NEAR = 1e-11, 8, 1e-3
@@ -64,11 +66,16 @@ def coefficient_of(curve: EquilibriumCurve | CycleCurve, w: Array, critical: com
         derivative, rounding = _beside_cycle(curve, w), _ROUNDING_OF_RETURNS
         form = _torus if np.imag(critical) else _flip
     try:
-        forms = _Forms(derivative, critical)
+        width = _WIDTH
+        forms = _Forms(derivative, critical, width)
+        # A state that rests at zero has no size: the motion may be linear much further around it.
+        if (reach := min(forms.reach(), _FARTHEST)) > _FAR:
+            width *= reach
+            forms = _Forms(derivative, critical, width)
         found = form(forms, critical)
     except (FilippovError, np.linalg.LinAlgError, ValueError):
         return np.nan
-    noise = 100.0 * rounding * float(np.max(np.abs(forms.first))) / _WIDTH**2
+    noise = 100.0 * rounding * float(np.max(np.abs(forms.first))) / width**2
     return found if abs(found) > noise else 0.0
 
 
@@ -80,9 +87,12 @@ class _Forms:
     derivative : callable
     critical : complex
         An eigenvalue.
+    width : float
+        That of the differences.
     """
 
-    def __init__(self, derivative: Derivative, critical: complex) -> None:
+    def __init__(self, derivative: Derivative, critical: complex, width: float) -> None:
+        self._width = width
         self.first = derivative(_HERE)
         values, vectors = np.linalg.eig(self.first)
         self.right: Complex = vectors[:, int(np.argmin(np.abs(values - critical)))].astype(np.complex128)
@@ -101,13 +111,23 @@ class _Forms:
 
     def _along(self, derivative: Derivative, direction: Array) -> tuple[Array, Array]:
         """Return the first and the second derivative, in a direction, of the derivative."""
-        ahead, behind = ([derivative(k * _WIDTH * sign * direction) for k in (1, 2, 3)] for sign in (1, -1))
+        width = self._width
+        ahead, behind = ([derivative(k * width * sign * direction) for k in (1, 2, 3)] for sign in (1, -1))
         odd = [a - b for a, b in zip(ahead, behind, strict=True)]
         even = [a + b - 2.0 * self.first for a, b in zip(ahead, behind, strict=True)]
         return (
-            np.tensordot(_FIRST, np.array(odd), 1) / _WIDTH,
-            np.tensordot(_SECOND, np.array(even), 1) / _WIDTH**2,
+            np.tensordot(_FIRST, np.array(odd), 1) / width,
+            np.tensordot(_SECOND, np.array(even), 1) / width**2,
         )
+
+    def reach(self) -> float:
+        """Return over which displacement the motion is nearly linear."""
+        first, second, third = (
+            max(float(np.max(np.abs(part))) for part in parts)
+            for parts in ([self.first], self._second, self._third)
+        )
+        with np.errstate(divide="ignore"):
+            return float(min(np.divide(first, second), np.sqrt(np.divide(first, third))))
 
     def second(self, other: Complex, conjugate: bool = False) -> Complex:
         """Return B(q, other), or that of the conjugate of q."""
