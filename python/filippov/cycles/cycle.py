@@ -728,7 +728,9 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
-                    turns = turns_of(found, len(found.itinerary.legs))
+                    # It crosses the plane k + 1 times.
+                    most = len(found.itinerary.legs) if found.itinerary.has_events() else k + 1
+                    turns = turns_of(found, most)
                     if turns > 1:
                         found = cycle_at(motions, *found.inside(), found.period / turns, None)
                     if _attracts(found):

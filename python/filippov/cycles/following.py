@@ -32,7 +32,7 @@ from filippov.cycles.passing import (
 )
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.shooting import scales
-from filippov.cycles.switching import single_at_doubling
+from filippov.cycles.switching import in_halves, single_at_doubling
 from filippov.cycles.zero import pair_between, zero_between
 from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
@@ -174,7 +174,7 @@ def continuation(
             f"start: a cycle, an equilibrium or a special point is needed, not {type(start).__name__}"
         )
     if isinstance(first, Cycle):
-        first = first.from_event().in_first_period()
+        first = in_halves(first.from_event().in_first_period())
     if store is not None and not isinstance(store, (str, PathLike)):
         raise InputError(f"store: a path is needed, not {store!r}")
     if store is not None and not Path(store).parent.is_dir():
@@ -963,10 +963,13 @@ def _difference_of_halves(curve: CycleCurve, w: Array) -> Array | None:
     """Return by how much the halves of a cycle differ, by its size; nothing if they are not alike."""
     shooting = curve.shooting
     n, m, legs = shooting.n, shooting.m, shooting.legs
-    if m % 2 or legs[-1].ending is None:
+    if m % 2:
         return None
-    first, second = legs[: m // 2], legs[m // 2 :]
-    if not all(a.is_alike(b) for a, b in zip(first, second, strict=True)):
+    if legs[-1].ending is None:
+        is_twice = shooting.itinerary(w[: curve.n_unknowns]).is_twice()
+    else:
+        is_twice = all(a.is_alike(b) for a, b in zip(legs[: m // 2], legs[m // 2 :], strict=True))
+    if not is_twice:
         return None
     states = (w / curve.scales(w))[: m * n].reshape(2, -1)
     return np.asarray(states[0] - states[1])

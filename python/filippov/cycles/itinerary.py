@@ -123,6 +123,20 @@ class Itinerary(NamedTuple):
             goes_on = leg.is_cut
         return Itinerary(tuple(legs), self.t0, tuple(starts), tuple(durations))
 
+    def twice(self) -> Itinerary:
+        """Return a cycle that nothing ends, followed twice."""
+        end = Ending(None, self.t0 + self.period, cuts=True)
+        legs = (*self.legs[:-1], self.legs[-1]._replace(ending=end), *self.legs)
+        return Itinerary(legs, self.t0, 2 * self.starts, 2 * self.durations)
+
+    def is_twice(self) -> bool:
+        """Whether nothing ends a cycle, and it consists of two halves with the same legs."""
+        m = len(self.legs) // 2
+        if len(self.legs) != 2 * m or self.legs[-1].ending is not None or not self.legs[m - 1].is_cut:
+            return False
+        first = (*self.legs[: m - 1], self.legs[m - 1]._replace(ending=None))
+        return all(a.is_alike(b) for a, b in zip(first, self.legs[m:], strict=True))
+
     def is_same(self, other: Itinerary) -> bool:
         """Whether two cycles have the same modes and endings, up to where they start."""
         own = [_signature(leg) for leg in self.merged().legs]

@@ -17,10 +17,10 @@ from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event
 from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium
-from filippov.cycles.shooting import Shooting
+from filippov.cycles.shooting import Period, Shooting
 from filippov.errors import InputError, ModelError
 
-__all__ = ["other_branch", "single_at_doubling"]
+__all__ = ["in_halves", "other_branch", "single_at_doubling"]
 
 
 def other_branch(special: Special, name: str, size: float) -> State:
@@ -102,14 +102,33 @@ def _doubled(cycle: Cycle) -> Cycle:
     motions, period = shooting.motions, shooting.period
     if period is not None:
         period = period.twice()
+    if not own.itinerary.has_events() and not own.itinerary.is_closed_by_event():
+        return _as_doubled(own, own._parts.twice(), period)
     t, x = own.inside()
     record = motions.record((t, t + 4.2 * own.period), x)
     itinerary = itinerary_from_event(record, 2 * own.period)
     if itinerary is None:
         raise ModelError("the cycle has no switch from which its double could start")
-    doubled = Shooting(motions, itinerary, period)
-    u = doubled.unknowns(itinerary)
-    return Cycle(doubled, u, doubled.shoot(u), 0.0)
+    return _as_doubled(own, itinerary, period)
+
+
+def _as_doubled(cycle: Cycle, itinerary: Itinerary, period: Period) -> Cycle:
+    shooting = Shooting(cycle._shooting.motions, itinerary, period)
+    u = shooting.unknowns(itinerary)
+    return Cycle(shooting, u, shooting.shoot(u), 0.0)
+
+
+def in_halves(cycle: Cycle) -> Cycle:
+    """Return a cycle that nothing ends as two halves, if it lasts an even number of periods of a forcing."""
+    shooting, itinerary = cycle._shooting, cycle._parts
+    is_even = shooting.period is not None and shooting.period.multiple % 2 == 0
+    if not is_even or len(itinerary.legs) > 1 or itinerary.legs[0].ending is not None:
+        return cycle
+    half = 0.5 * cycle.period
+    once = itinerary._replace(durations=(half,)).twice()
+    return _as_doubled(
+        cycle, once._replace(starts=(once.starts[0], cycle.at(cycle.t0 + half))), shooting.period
+    )
 
 
 def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
@@ -133,7 +152,10 @@ def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
     doubled = shooting.itinerary(w[: curve.n_unknowns])
     states = np.array(doubled.starts).reshape(2, m // 2, n).mean(axis=0)
     durations = np.array(doubled.durations).reshape(2, m // 2).mean(axis=0)
-    half = Itinerary(doubled.legs[: m // 2], doubled.t0, tuple(states), tuple(durations.tolist()))
+    legs = doubled.legs[: m // 2]
+    if doubled.is_twice():
+        legs = (*legs[:-1], legs[-1]._replace(ending=None))
+    half = Itinerary(legs, doubled.t0, tuple(states), tuple(durations.tolist()))
     motions = shooting.motions.with_derivatives_by(())
     period = None if shooting.period is None else shooting.period.half()
 
