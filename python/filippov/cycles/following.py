@@ -111,7 +111,7 @@ def continuation(
     ----------
     start : Cycle, Equilibrium or Special
         With one parameter a special point is where the other branch through it starts: cycles of twice the
-        period at PD, the other equilibria at BE, cycles at HB. With two parameters the curve goes through it.
+        period at PD, the other equilibria at BE, the crossing branch at BP, cycles at HB. With two parameters the curve goes through it.
     parameter : str, or pair of str
         What varies. A curve in two parameters has no `monitor`, `detect`, `switch` and `store`.
     bounds : (float, float), or dict
@@ -181,7 +181,9 @@ def continuation(
         raise InputError(f"store: there is no folder {Path(store).parent}")
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
     directions = [-1.0, 1.0]
-    if isinstance(start, Special):
+    # The branch that crosses another one goes on to both sides of it.
+    begins = isinstance(start, Special) and start.code != "BP"
+    if isinstance(start, Special) and begins:
         place = _Side(first, settings, 1.0).start.place
         by_value = float(np.sign(first.params[parameter] - start.params[parameter]))
         away = _way_from(start, place, first) or by_value or 1.0
@@ -198,7 +200,7 @@ def continuation(
     try:
         for direction in directions:
             sides.append(_Side(first, settings, direction))
-            if isinstance(start, Special) and direction == directions[0]:
+            if begins and direction == directions[0]:
                 sides[0].reason = f"it starts at {start!r}"
             else:
                 sides[-1].follow()
@@ -286,12 +288,7 @@ def curve_of(state: State, names: tuple[str, ...], sizes: tuple[float, ...]) -> 
     if isinstance(state, Cycle):
         curve = CycleCurve(state, names, sizes)
         return curve, curve.start
-    own = EquilibriumCurve(state._curve.motions, state._curve.mode, names, sizes)
-    w = np.append(state._w[: own.n_unknowns], [state.params[name] for name in names])
-    own.sizes_of_states = state._curve.sizes_of_states
-    if not np.any(own.sizes_of_states):
-        own.measure_states(w)
-    return own, w
+    return state.in_parameters(names, sizes)
 
 
 def at_value(state: State, name: str, value: float, most_halvings: int = 5) -> State:

@@ -141,6 +141,15 @@ class Equilibrium:
             return "unstable"
         return "stable" if all(value < 0 for value in most) else "neutral"
 
+    def in_parameters(self, names: Sequence[str], sizes: Sequence[float]) -> tuple[EquilibriumCurve, Array]:
+        """Return its equations with some parameters as further unknowns, and the point itself."""
+        curve = EquilibriumCurve(self._curve.motions, self._curve.mode, names, sizes)
+        w = np.append(self._w[: curve.n_unknowns], [self.params[name] for name in names])
+        curve.sizes_of_states = self._curve.sizes_of_states
+        if not np.any(curve.sizes_of_states):
+            curve.measure_states(w)
+        return curve, w
+
     def __repr__(self) -> str:
         kind = "pseudo-equilibrium" if self.codimension else "equilibrium"
         words = f"{self.stability}{'' if self.is_admissible else ', virtual'}"

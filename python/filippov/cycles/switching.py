@@ -16,7 +16,7 @@ from filippov.cycles.cycle import Cycle, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event
 from filippov.cycles.motions import Array
-from filippov.cycles.rest import Equilibrium
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.cycles.shooting import Period, Shooting
 from filippov.errors import InputError, ModelError
 
@@ -52,10 +52,11 @@ def other_branch(special: Special, name: str, size: float) -> State:
             "parameters is followed with two names, and a state with branch.at(...)"
             + ("; the cycles that begin at PH are found by a run beside it" if special.code == "PH" else "")
         )
-    if not isinstance(state, Cycle):
-        raise InputError("start: other branches of equilibria begin at BE and HB")
+    if isinstance(state, Equilibrium):
+        return _beside(*state.in_parameters((name,), (size,)), special)
     cycle = _doubled(state) if special.code == "PD" else state.from_event()
-    return _beside(CycleCurve(cycle, (name,), (size,)), special)
+    curve = CycleCurve(cycle, (name,), (size,))
+    return _beside(curve, curve.start, special)
 
 
 def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
@@ -182,14 +183,13 @@ def single_at_doubling(curve: CycleCurve, one: Array, other: Array) -> Cycle:
     return cycle_at(b)
 
 
-def _beside(curve: CycleCurve, special: Special) -> State:
-    """Return a cycle beside the start of a curve, along the other direction of the kernel there."""
-    w = curve.start
+def _beside(curve: CycleCurve | EquilibriumCurve, w: Array, special: Special) -> State:
+    """Return a state beside a point of a curve, along the other direction of the kernel there."""
     scale = curve.scales(w)
     _, jacobian = curve.equations(w)
     kernel = np.linalg.svd(jacobian * scale)[2][-2:]
     # Take what is across the branch that is known: a doubled cycle of it is the same half a period later.
-    if special.code == "PD":
+    if special.code == "PD" and isinstance(curve, CycleCurve):
         along = _symmetric(kernel, curve)
     elif len(special.tangent) == len(w):
         along = kernel.T @ (kernel @ (np.array(special.tangent) / scale))
