@@ -111,7 +111,8 @@ def continuation(
     ----------
     start : Cycle, Equilibrium or Special
         With one parameter a special point is where the other branch through it starts: cycles of twice the
-        period at PD, the other equilibria at BE, the crossing branch at BP, cycles at HB. With two parameters the curve goes through it.
+        period at PD, the other equilibria at BE, the crossing branch at BP, cycles at HB. With two
+        parameters the curve goes through it.
     parameter : str, or pair of str
         What varies. A curve in two parameters has no `monitor`, `detect`, `switch` and `store`.
     bounds : (float, float), or dict
