@@ -225,8 +225,8 @@ examples:
 
 The cycle is found as by `filippov cycle`, or with --equilibrium the equilibrium near the initial state. The
 branch is followed through sliding bifurcations, and special points are printed: LP fold, PD period doubling,
-NS torus, HB Hopf, BE boundary equilibrium, PSN pseudo-saddle-node, CS GS SS AS crossing-, grazing-,
-switching- and adding-sliding, GR grazing of a reset, EP end.
+NS torus, HB Hopf, BE boundary equilibrium, PSN pseudo-saddle-node, PH pseudo-Hopf, CS GS SS AS crossing-,
+grazing-, switching- and adding-sliding, GR grazing of a reset, EP end.
 """
 
 
