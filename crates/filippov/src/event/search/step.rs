@@ -14,12 +14,13 @@ use crate::event::filter::{least_of_cubic, may_vanish, may_vanish_bent, may_vani
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{Event, Found};
-use crate::motion::{AffineBounds, Guard, KnownMultipliers, ModeField, Monitored};
+use crate::motion::{AffineBounds, Deflation, Guard, KnownMultipliers, ModeField, Monitored};
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::system::is_zero_within;
 use crate::tolerances::{
-    EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH, SPARE_SPREAD,
+    CANCELLED, EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH,
+    SPARE_SPREAD,
 };
 
 impl StepSearch<'_, '_> {
@@ -125,6 +126,9 @@ impl StepSearch<'_, '_> {
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             return Ok(false);
         }
+        if self.drowns(sought.dt)? {
+            return Ok(false);
+        }
         if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
@@ -158,6 +162,25 @@ impl StepSearch<'_, '_> {
             self.seek_beyond(sought)?;
         }
         Ok(true)
+    }
+
+    /// Is the state at the end of the step so large that its rounding drowns what a surface is at the start, or its leading term if
+    /// that is left? So long may a step of a series be that ends, as that of a polynomial.
+    fn drowns(&mut self, dt: f64) -> Result<bool, FieldError> {
+        let size = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let start = size(&self.run.x);
+        if start == 0.0 || size(self.stepper.end()) <= CANCELLED * start {
+            return Ok(false);
+        }
+        for index in 0..self.run.motion.monitored.len() {
+            let m = self.run.motion.monitored[index];
+            let leading = |zero: Deflation| zero.leading.abs() * dt.powi(zero.order);
+            let value = m.deflation.map_or(m.value, leading);
+            if m.guard.is_surface() && value < CANCELLED * self.noise_of(&m)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
