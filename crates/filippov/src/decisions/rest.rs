@@ -9,6 +9,7 @@ use crate::motion::{shares_of_rows, SmoothField};
 use crate::status::{Warning, WarningCode};
 use crate::system::{eval_on_side, is_zero_within};
 use crate::tolerances::{AT_SIDE, FEW_SURFACES, PLACES_BESIDE_REST, STEPS_INSIDE};
+use crate::vectors::largest;
 
 /// Rest, where the motions of all modes lead back to the surfaces: tried at points beside them, as far as the tolerance and
 /// nearer. Multipliers keep the state where it is; or the point is isolated, the system does not depend on time, and no
@@ -213,7 +214,7 @@ fn place_beside(
 fn warn_of_rest(at: &Point, notes: &mut Notes, meeting: &Meeting) {
     let names = meeting.surfaces.iter();
     let names: Vec<String> = names.map(|&j| at.system.surface_name(j) + " = 0").collect();
-    let size = at.x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let size = largest(at.x);
     notes.warnings.push(Warning {
         t: at.t,
         code: WarningCode::AtRest,

@@ -3,6 +3,7 @@
 use crate::error::FieldError;
 use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::ON_SURFACE;
+use crate::vectors::largest;
 
 /// A point that lies on no surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +34,7 @@ pub fn field_off_surfaces(
         system.field(&Setting::new(&complete(signs)?, q).at(t, x), &mut dx)?;
         Ok(dx)
     };
-    let largest = x.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    let largest = largest(x);
     let tiny = ON_SURFACE * (1.0 + largest);
     let mut signs = vec![1.0; n_seen];
     let mut h = vec![0.0; system.n_surfaces()];

@@ -10,6 +10,7 @@ use crate::options::Options;
 use crate::stats::Stats;
 use crate::system::{Actions, AffineParts, PiecewiseSystem};
 use crate::tolerances::{SMALL_JUMP, STAGE_SPREAD};
+use crate::vectors::largest;
 
 /// A run: its problem, the place that it has reached, the motion from there, and what was counted.
 ///
@@ -23,6 +24,8 @@ pub(crate) struct Run<'a> {
     pub scale: ErrorScale,
     pub t: f64,
     pub x: Vec<f64>,
+    /// The largest magnitude of a state at its start.
+    pub size: f64,
     pub motion: CurrentMotion<'a>,
     /// The exit functions of the motion in the step.
     pub seen: Vec<Seen>,
@@ -53,6 +56,7 @@ impl<'a> Run<'a> {
             scale: ErrorScale::new(options.rtol, &options.atol, x.len()),
             t,
             x: x.to_vec(),
+            size: largest(x),
             motion: CurrentMotion::new(
                 system,
                 t,

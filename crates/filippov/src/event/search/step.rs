@@ -22,6 +22,7 @@ use crate::tolerances::{
     CANCELLED, EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH,
     SPARE_SPREAD,
 };
+use crate::vectors::largest;
 
 impl StepSearch<'_, '_> {
     /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
@@ -167,9 +168,8 @@ impl StepSearch<'_, '_> {
     /// Is the state at the end of the step so large that its rounding drowns what a surface is at the start, or its leading term if
     /// that is left? So long may a step of a series be that ends, as that of a polynomial.
     fn drowns(&mut self, dt: f64) -> Result<bool, FieldError> {
-        let size = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let start = size(&self.run.x);
-        if start == 0.0 || size(self.stepper.end()) <= CANCELLED * start {
+        let start = largest(&self.run.x).max(self.run.size);
+        if start == 0.0 || largest(self.stepper.end()) <= CANCELLED * start {
             return Ok(false);
         }
         for index in 0..self.run.motion.monitored.len() {
