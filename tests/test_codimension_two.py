@@ -311,3 +311,17 @@ def test_a_curve_of_boundary_equilibria_knows_both_sides(start: str) -> None:
     assert fold.code == "PSN"
     np.testing.assert_allclose([fold.params["mu"], fold.params["k"]], [0, -1], atol=1e-9)
     assert str(fold.state.mode) == "0"
+
+
+@pytest.mark.parametrize("place", [0.0, 2.0, 10.0])
+@pytest.mark.parametrize("rate", [0.01, 1.0, 100.0])
+def test_a_generalised_hopf_point_in_any_units_and_anywhere(rate: float, place: float) -> None:
+    # For b = 1 the system is linear.
+    def field(t: Any, x: Any, a: Any = -0.3, b: Any = 0.2) -> Any:
+        u = x[0] - place
+        return [rate * (a * u - x[1] - u**3 * (1 - b)), rate * (u + a * b * x[1] + b * x[1])]
+
+    rest = fl.equilibrium(fl.System(field, n=2), [place + 0.01, 0])
+    hopf = fl.continuation(rest, "a", (-1, 1)).special["HB"][0]
+    curve = fl.continuation(hopf, ("a", "b"), {"a": (-0.9, 0.9), "b": (-0.7, 2)})
+    np.testing.assert_allclose([point.params["b"] for point in curve.special["GH"]], [1.0], atol=1e-8)

@@ -206,6 +206,7 @@ class _SpectralCondition:
     def __init__(self, curve: AnyCurve, special: Special, w: Array) -> None:
         self.curve, self.code, self.key = curve, special.code, special.test
         self._null: Array | None = None
+        self._width: float | None = None
         is_pair = self.code in ("HB", "NS")
         self._pair = CriticalPair(self.code == "HB", self._spectrum(w)) if is_pair else None
 
@@ -242,7 +243,8 @@ class _SpectralCondition:
 
     def _add_coefficient(self, found: Tests, code: str, w: Array, critical: complex) -> None:
         poles = [found[pole,] for pole in POLES[code]]
-        found[code,] = float(coefficient_of(self.curve, w, critical) * np.prod(poles))
+        coefficient, self._width = coefficient_of(self.curve, w, critical, self._width)
+        found[code,] = float(coefficient * np.prod(poles))
 
     def is_genuine(self, code: str, w: Array) -> bool:
         values = self._spectrum(w)

@@ -32,8 +32,9 @@ _DEFECTIVE = 1e-6
 _HERE = np.zeros(1)
 # Differences over one, two and three widths.
 _WIDTH = 0.03
-# They are wider where the motion is linear so many times further than the size of its states, up to a limit.
-_FAR, _FARTHEST = 10.0, 1e3
+# They are at most so many times wider where the motion is linear further than the size of its states; these
+# have none around zero.
+_FARTHEST, _FARTHEST_AROUND_ZERO = 30.0, 1e3
 _FIRST, _SECOND = np.array([0.75, -0.15, 1 / 60]), np.array([1.5, -0.15, 1 / 90])
 # Newton's method between the legs of a return, and on surfaces; a step along the motion on these.
 _ARRIVED, _MOST_STEPS, _NEAR = 1e-11, 8, 1e-3
@@ -41,7 +42,9 @@ _ARRIVED, _MOST_STEPS, _NEAR = 1e-11, 8, 1e-3
 _ROUNDING_OF_FIELDS, _ROUNDING_OF_RETURNS = 1e-15, 1e-11
 
 
-def coefficient_of(curve: EquilibriumCurve | CycleCurve, w: Array, critical: complex) -> float:
+def coefficient_of(
+    curve: EquilibriumCurve | CycleCurve, w: Array, critical: complex, width: float | None = None
+) -> tuple[float, float]:
     """Return a coefficient of the normal form at a point of a curve; 0 within rounding.
 
     Parameters
@@ -53,11 +56,17 @@ def coefficient_of(curve: EquilibriumCurve | CycleCurve, w: Array, critical: com
     critical : complex
         The eigenvalue or multiplier, that above the real axis of a pair.
 
+    width : float, optional
+        That of the differences, in sizes of the states. Default: as far as the motion is not linear.
+
     Returns
     -------
-    float
-        Up to a positive factor: positive for unstable cycles at a Hopf point and for unstable tori, negative
-        for unstable cycles at a period doubling. NaN where the motion has no derivatives.
+    coefficient : float
+        Up to a positive factor, by which it has no units: positive for unstable cycles at a Hopf point and
+        for unstable tori, negative for unstable cycles at a period doubling. NaN where the motion has no
+        derivatives.
+    width : float
+        That used. With the same width it is smooth along a curve.
     """
     if isinstance(curve, EquilibriumCurve):
         beside = _beside_pseudo_equilibrium if curve.sliding else _beside_equilibrium
@@ -66,17 +75,23 @@ def coefficient_of(curve: EquilibriumCurve | CycleCurve, w: Array, critical: com
         derivative, rounding = _beside_cycle(curve, w), _ROUNDING_OF_RETURNS
         form = _torus if np.imag(critical) else _flip
     try:
-        width = _WIDTH
-        forms = _Forms(derivative, critical, width)
-        # A state that rests at zero has no size: the motion may be linear much further around it.
-        if (reach := min(forms.reach(), _FARTHEST)) > _FAR:
-            width *= reach
+        forms = _Forms(derivative, critical, width or _WIDTH)
+        if width is None:
+            width = _WIDTH * min(max(forms.reach(), 1.0), _farthest(curve, w))
             forms = _Forms(derivative, critical, width)
         found = form(forms, critical)
     except (FilippovError, np.linalg.LinAlgError, ValueError):
-        return np.nan
-    noise = 100.0 * rounding * float(np.max(np.abs(forms.first))) / width**2
-    return found if abs(found) > noise else 0.0
+        return np.nan, width or _WIDTH
+    found *= width**2 / forms.size()
+    return (found if abs(found) > 100.0 * rounding else 0.0), width
+
+
+def _farthest(curve: EquilibriumCurve | CycleCurve, w: Array) -> float:
+    if isinstance(curve, EquilibriumCurve):
+        n = curve.n
+        if np.max(np.abs(w[:n])) < _NEAR * np.max(curve.scales(w)[:n]):
+            return _FARTHEST_AROUND_ZERO
+    return _FARTHEST
 
 
 class _Forms:
@@ -119,6 +134,10 @@ class _Forms:
             np.tensordot(_FIRST, np.array(odd), 1) / width,
             np.tensordot(_SECOND, np.array(even), 1) / width**2,
         )
+
+    def size(self) -> float:
+        """Return the size of the first derivative beside which the others are rounded, in any units."""
+        return float(np.abs(self.left) @ np.abs(self.first) @ np.abs(self.right))
 
     def reach(self) -> float:
         """Return over which displacement the motion is nearly linear."""
