@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.errors import ModelError
 
@@ -18,8 +19,10 @@ __all__ = ["beyond_boundary"]
 
 def beyond_boundary(
     state: Equilibrium, surface: int, name: str, size: float, bounds: tuple[float, float] = (-np.inf, np.inf)
-) -> tuple[Equilibrium, float] | None:
-    """Return the equilibrium that continues in another mode from a boundary, and its direction there.
+) -> tuple[Equilibrium, Array] | None:
+    """Return the equilibrium that continues in another mode from a boundary, and the way to it.
+
+    The way is the difference of the unknowns of the other mode: states, multipliers, parameter.
 
     Parameters
     ----------
@@ -71,8 +74,8 @@ def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...
 
 def _admissible_along(
     curve: EquilibriumCurve, point: Step, bounds: tuple[float, float]
-) -> tuple[Equilibrium, float] | None:
-    """Return the nearest admissible equilibrium of a branch, and the direction to it."""
+) -> tuple[Equilibrium, Array] | None:
+    """Return the nearest admissible equilibrium of a branch, and the way to it."""
     scale = curve.scales(point.w)
     tangent = tangent_of(point.jacobian, scale)
     for sign in (1.0, -1.0):
@@ -82,5 +85,5 @@ def _admissible_along(
             continue
         state = curve.state(step.w, step.error)
         if state.is_admissible and bounds[0] <= step.w[-1] <= bounds[1]:
-            return state, float(np.sign(step.w[-1] - point.w[-1])) or sign
+            return state, step.w - point.w
     return None

@@ -53,8 +53,9 @@ CODIMENSION_TWO = {
 
 # Behind such a point of such a curve the critical pair is real: nothing happens there.
 ENDS = (("HB", "BT"), ("NS", "R1"), ("NS", "R2"))
-# A coefficient of a normal form has poles where these test functions vanish. It is multiplied by them.
-POLES = {"GH": ("ZH",), "CH": ("LPNS",), "GPD": ("R2", "LPPD")}
+# A coefficient of a normal form has poles where these test functions vanish. It is multiplied by them. Those
+# of sliding motion are eigenvalues, infinite where its surfaces turn from attracting to repelling.
+POLES = {"GH": ("ZH",), "CH": ("LPNS",), "GPD": ("R2", "LPPD"), "PSN": ("PH",), "HB": ("PH",)}
 
 
 def beside_fold(code: str, values: Spectrum, is_flow: bool) -> Tests:

@@ -486,8 +486,9 @@ class _Side:
         return curve.state(step.w, step.error)
 
     def _vanishes(self) -> bool:
-        """Whether a cycle without switches has shrunk to an equilibrium, where its branch ends."""
-        if not shrinks_to_point([point.state for point in self.points]):
+        """Whether a cycle has shrunk to an equilibrium, where its branch ends."""
+        states = [point.state for point in self.points]
+        if not shrinks_to_point(states) and not self._has_shrunk(states[-1]):
             return False
         self.points.pop()
         value = self.points[-1].params[self.settings.name]
@@ -503,12 +504,17 @@ class _Side:
         first = self.points[0].state
         if not isinstance(state, Cycle) or not isinstance(first, Cycle):
             return False
-        return _extent(state) < _SHRUNK * _extent(first)
+        # Where the legs start is a first, cheap look.
+        starts = float(np.max(np.ptp(state.itinerary.starts, axis=0)))
+        own = _extent(first) if starts < _SHRUNK * _size_of(first) else 0.0
+        return starts < _SHRUNK * own and _extent(state) < _SHRUNK * own
 
     def _grows(self) -> bool:
-        """Whether the cycle, or its period, grows without bound: the parameter comes to a limit."""
+        """Whether the cycle or its period grows without bound or vanishes: the parameter has a limit."""
         first, last = self.points[0].state, self.points[-1].state
-        if not isinstance(first, Cycle) or not isinstance(last, Cycle):
+        if isinstance(last, Equilibrium):
+            return self._leaves_along_a_line()
+        if not isinstance(first, Cycle):
             return False
         name, value = self.settings.name, float(self.here.place.w[-1])
         if self._comes_to_an_asymptote():
@@ -528,7 +534,25 @@ class _Side:
                     "cycle comes to an orbit that begins and ends at an equilibrium"
                 )
                 return True
+            if point.state.period > 1.3 * last.period:
+                self.reason = f"the cycle shrinks to an equilibrium near {name} = {value:.9g}"
+                return True
         return False
+
+    def _leaves_along_a_line(self) -> bool:
+        """Whether equilibria at one value of the parameter go away without bound."""
+        name, last = self.settings.name, self.points[-1].params[self.settings.name]
+        sizes = []
+        for point in self.points[::-1]:
+            if abs(point.params[name] - last) > _STANDS * self.settings.size:
+                break
+            assert isinstance(point.state, Equilibrium)
+            sizes.append(float(np.max(np.abs(point.state.y))))
+        own = float(np.max(self.start.place.scale[:-1]))
+        if sizes[0] < 10.0**_TENFOLDS * max(sizes[-1], own):
+            return False
+        self.reason = f"at {name} = {last:.9g} equilibria fill a line, which has no end up to {sizes[0]:.3g}"
+        return True
 
     def _comes_to_an_asymptote(self) -> bool:
         """Whether the parameter moves less than half as far by each tenfold of the cycle: it converges."""
@@ -605,7 +629,7 @@ class _Side:
             def value(s: float, key: Any = key, seen: Any = seen) -> float:
                 seen[s] = self._beside(s, (before if s < 0 else end).place)
                 found: float = seen[s][1].tests.get(key, np.nan)
-                return found if abs(found) > _NOISE else 0.0
+                return found if abs(found) > self._noise(key) else 0.0
 
             try:
                 s = pair_between(value, known)
@@ -641,7 +665,7 @@ class _Side:
         changed = [
             key
             for key in self._wanted(before, after)
-            if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > _NOISE
+            if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > self._noise(key)
         ]
         places = (self._located(self.here, key, following) for key in changed)
         # What vanishes together with a change of the itinerary comes before it.
@@ -673,6 +697,17 @@ class _Side:
             following, state = self._finer(following, finer), finer
         self._go_on(following, state)
         return True
+
+    def _noise(self, key: Any) -> float:
+        """Return the size of what is rounding of a test function; those of boundaries have units."""
+        curve, (w, scale, _), _ = self.here
+        if key[0] not in CHANGES:
+            return _NOISE
+        if isinstance(curve, EquilibriumCurve):
+            return _NOISE * min(1.0, float(np.max(scale[: curve.n])))
+        size, m = float(np.max(scale[: curve.shooting.n])), curve.shooting.m
+        period = float(np.sum(w[m * curve.shooting.n : m * (curve.shooting.n + 1)]))
+        return _NOISE * min(1.0, size, size / period)
 
     def _wanted(self, before: dict[Any, float], after: dict[Any, float]) -> list[Any]:
         """Return the keys of the test functions to look at that are known at two points."""
@@ -767,18 +802,24 @@ class _Side:
     def _change(self, key: Any, located: Step, beyond: Array) -> bool:
         """Continue with the itinerary that the flow takes behind a special point. False: the branch ends."""
         curve = self.here.curve
-        direction = float(np.sign(beyond[-1] - located.w[-1])) or self.direction
-        following: tuple[State, float] | None = None
+        bounds = self.settings.bounds
         if isinstance(curve, EquilibriumCurve):
             here = curve.state(located.w, located.error)
-            size, bounds = self.settings.size, self.settings.bounds
-            following = beyond_boundary(here, key[1], self.settings.name, size, bounds)
-        else:
-            new = beyond_change(curve, located, beyond)
-            following = back_from_change(curve, key, located) if new is None else (new, direction)
+            beside = beyond_boundary(here, key[1], self.settings.name, self.settings.size, bounds)
+            if beside is None:
+                self.reason = f"behind {self.special[-1]!r} no equilibrium was found"
+                return False
+            state, way = beside
+            position = self._position(state, 1.0)
+            # Along a line of equilibria the parameter stands still.
+            leads_back = position.place.tangent @ (way / position.place.scale) < 0
+            self._go_on(position.turned() if leads_back else position, state)
+            return True
+        direction = float(np.sign(beyond[-1] - located.w[-1])) or self.direction
+        new = beyond_change(curve, located, beyond, bounds)
+        following = back_from_change(curve, key, located) if new is None else (new, direction)
         if following is None:
-            what = "equilibrium" if isinstance(curve, EquilibriumCurve) else "cycle of the flow"
-            self.reason = f"behind {self.special[-1]!r} no {what} was found"
+            self.reason = f"behind {self.special[-1]!r} no cycle of the flow was found"
             return False
         self._go_on(self._position(*following), following[0])
         return True

@@ -32,7 +32,9 @@ _PLACES, _AROUND = 64, np.linspace(-1.0, 1.0, 33)
 _WIDTHS = tuple(1.5 / _PLACES * (1.5 / 16) ** k for k in range(4))
 
 
-def beyond_change(curve: CycleCurve, located: Step, beyond: Array) -> Cycle | None:
+def beyond_change(
+    curve: CycleCurve, located: Step, beyond: Array, bounds: tuple[float, float]
+) -> Cycle | None:
     """Return the cycle of the flow behind a change, with another itinerary, if the cycle persists.
 
     Parameters
@@ -42,6 +44,8 @@ def beyond_change(curve: CycleCurve, located: Step, beyond: Array) -> Cycle | No
         The point at which the flow leaves the itinerary of the curve.
     beyond : ndarray
         A point of the curve behind it.
+    bounds : (float, float)
+        The range of the parameter: what is found in it comes first.
     """
     scale = curve.scales(located.w)
     itinerary = curve.shooting.itinerary(located.w[: curve.n_unknowns])
@@ -54,7 +58,9 @@ def beyond_change(curve: CycleCurve, located: Step, beyond: Array) -> Cycle | No
         distance = distance_from(curve, w, new)
         return new, distance, float(np.max(np.abs((w - located.w) / scale)))
 
-    for reach in _REACHES:
+    ends = [located.w[-1] + reach * (beyond[-1] - located.w[-1]) for reach in _REACHES]
+    is_outside = [not bounds[0] <= end <= bounds[1] for end in ends]
+    for reach, _ in sorted(zip(_REACHES, is_outside, strict=True), key=lambda row: row[1]):
         found = found_at(reach)
         if found is None:
             continue

@@ -45,6 +45,8 @@ _REGULAR = 1e8
 _NO_JUMP = 1e-9
 # Real parts of eigenvalues below this part of the largest eigenvalue are rounding.
 _ROUNDING = 1e-12
+# Differences are exact to this part of a row.
+_OF_DIFFERENCES = 1e-9
 # By this states are measured that are zero.
 _SMALL = 1e-3
 
@@ -259,8 +261,11 @@ class EquilibriumCurve:
         scaled = jacobian[:, :k] * self.scales(w)[:k]
         moves = np.zeros(self.n)
         if np.isfinite(jacobian).all() and np.linalg.cond(scaled) < _REGULAR:
-            per_size = np.linalg.solve(jacobian[:, :k], jacobian[:, k:] * self.sizes)
-            moves = np.max(np.abs(per_size[: self.n]), axis=1, initial=0.0)
+            inverse = np.linalg.inv(jacobian[:, :k])
+            moves = np.max(np.abs(inverse @ (jacobian[:, k:] * self.sizes))[: self.n], axis=1, initial=0.0)
+            # The derivatives by parameters are differences.
+            noise = np.abs(inverse) @ (_OF_DIFFERENCES * np.max(np.abs(scaled), axis=1))
+            moves[moves <= noise[: self.n]] = 0.0
         found = np.maximum(np.abs(w[: self.n]), 0.1 * moves)
         # States that rest at zero have no size of their own.
         self.sizes_of_states = np.where(found > self.motions.negligible, found, _SMALL)
@@ -303,11 +308,6 @@ class EquilibriumCurve:
         """Return the gradients of the surfaces slid on, shape (m, n)."""
         return np.asarray(self._by_unknowns(w)[self.n :, : self.n])
 
-    def normal_rates(self, w: Array) -> Array:
-        """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
-        jacobian = self._by_unknowns(w)
-        return np.asarray(jacobian[self.n :, : self.n] @ jacobian[: self.n, self.n :])
-
     def normal_velocities(self, w: Array) -> dict[tuple[int, ...], Array]:
         """Return the rates of the functions of the surfaces slid on, in each region beside them."""
         normals, found = self.normals(w), {}
@@ -317,12 +317,20 @@ class EquilibriumCurve:
         return found
 
     def speed_away(self, w: Array) -> float:
-        """Return how fast motions beside the surfaces slid on go away from them: not at all if negative."""
+        """Return how fast motions beside the surfaces slid on go away, as a part of the largest rates.
+
+        Negative: all come to the surfaces.
+        """
         multipliers = w[self.n : self.n_unknowns]
         if len(self.sliding) == 2 and np.all(np.abs(multipliers) < 1.0):
             most = speed_away(self.normal_velocities(w))
             return 0.0 if abs(most) <= _ROUNDING else most
-        return _largest_real_part(np.linalg.eigvals(self.normal_rates(w)))
+        jacobian = self._by_unknowns(w)
+        sizes = self.scales(w)[: self.n]
+        normals = jacobian[self.n :, : self.n] * sizes
+        by_multipliers = jacobian[: self.n, self.n :] / sizes[:, None]
+        largest = float(np.linalg.norm(normals) * np.linalg.norm(by_multipliers)) or 1.0
+        return _largest_real_part(np.linalg.eigvals(normals @ by_multipliers) / largest)
 
     def _by_unknowns(self, w: Array) -> Array:
         """Return the derivatives by states and multipliers, (n + m, n + m), exact if the graph has them."""
