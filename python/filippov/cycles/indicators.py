@@ -99,9 +99,9 @@ def _of_equilibrium(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
     values = spectrum_of(curve, w)
     if values is None:
         return found
+    found["PSN" if curve.sliding else "LP",] = float(np.prod(values).real)
     # Without units, and smooth: the sum of all squares has no kink.
     values = values / (float(np.linalg.norm(values)) or 1.0)
-    found["PSN" if curve.sliding else "LP",] = float(np.prod(values).real)
     pairs = [values[i] + values[j] for i in range(len(values)) for j in range(i)]
     if pairs:
         found["HB",] = float(np.prod(np.array(pairs)).real)
