@@ -973,19 +973,17 @@ def shrinks_to_point(states: Sequence[State]) -> bool:
 
     Behind it the curve comes back with cycles turned inside out.
     """
-    first, ends = states[0], states[-2:]
-    spans = []
-    for state in (first, *ends):
+    if len(states) < 2:
+        return False
+    first, spans = states[0], []
+    for state in (states[-1], states[-2], first):
         if not isinstance(state, Cycle) or state.is_forced:
             return False
         if state is not first and len(state.itinerary.legs) > 1:
             return False
         spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
-    if len(ends) < 2:
-        return False
-    return bool(
-        spans[1] @ spans[2] <= 0 or np.linalg.norm(spans[2]) <= 1e-3 * float(np.linalg.norm(spans[0]))
-    )
+    last, before, own = spans
+    return bool(last @ before <= 0 or np.linalg.norm(last) <= 1e-3 * float(np.linalg.norm(own)))
 
 
 def _extent(cycle: Cycle) -> float:
