@@ -612,8 +612,8 @@ class _Side:
     def _at_pair_of_zeros(self, end: _Position) -> tuple[Step, _Position] | None:
         """Return a point between two zeros of a test function before the end of a step, if there are some.
 
-        Signs tell nothing of two zeros. A parabola through three points tells where they may be; if that
-        is before this point, the branch goes back by one point.
+        A function that vanishes twice has the same sign at both ends. The parabola through three points shows
+        where the zeros may be; if they are before this point, the branch goes back by one point.
         """
         if not self.earlier:
             return None
