@@ -92,3 +92,54 @@ def test_the_curve_of_folds_ends_at_a_generalised_hopf_point() -> None:
     assert np.all(b2 > 0)
     assert b2.min() < 0.01
     assert "the cycle shrinks to an equilibrium" in curve.reasons["one way"]
+
+
+def test_impacts_are_added_one_by_one() -> None:
+    # At each grazing the branch takes one impact more, to more than eight; another cycle with fewer is near.
+    w, damping = 2.5, 0.2
+    size = 1 / np.hypot(1 - w**2, damping * w)
+    wall = fl.Reset(lambda t, x, g: x[0] - g, lambda t, x, r: [x[0], -r * x[1]], direction="up")
+
+    def field(t: Any, x: Any, g: Any = 1.0, r: Any = 0.7) -> Any:
+        return [x[1], np.cos(w * t) - damping * x[1] - x[0]]
+
+    system = fl.System(field, n=2, resets=wall)
+    cycle = fl.limit_cycle(system, [0.0, 0.0], {"g": 1.5 * size})
+    branch = fl.continuation(cycle, "g", (0.2 * size, 2 * size))
+    numbers = [len(point.state.itinerary.legs) for point in branch.points]
+    changes = np.diff(numbers)
+    assert np.all(changes >= 0) or np.all(changes <= 0)
+    assert max(numbers) > 8
+    assert np.max(np.abs(changes)) == 1
+    assert len(branch.special["GR"]) >= max(numbers) - min(numbers)
+    assert_cycles_close(branch, 7)
+
+
+def friction(t: Any, x: Any, F: Any = 0.4, omega: Any = 1 / 3) -> Any:
+    return [x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])]
+
+
+@pytest.mark.parametrize("omega", [0.32, 1 / 3, 0.42, 0.45])
+@pytest.mark.parametrize("start", [0.4, 0.06])
+def test_switching_sliding_where_a_multiplier_is_one(omega: float, start: float) -> None:
+    # Closed form: a slip of 2 pi from rest ends at the bound of the force on the other side, at this F. Its
+    # monodromy is the identity, so that the equations are singular there.
+    system = fl.System(friction, n=2)
+    cycle = fl.limit_cycle(system, [1.0, 2.0], {"omega": omega, "F": start})
+    branch = fl.continuation(cycle, "F", (0.05, 0.5))
+    assert [end.params["F"] for end in branch.special["EP"]] == [0.05, 0.5]
+    (found,) = branch.special["SS"]
+    assert abs(found.params["F"] - omega**2 / (1 - omega**2) * np.sin(omega * np.pi)) < 1e-7
+    assert_cycles_close(branch, 5)
+
+
+def test_a_minimum_that_appears_within_a_step() -> None:
+    # Upwards the velocity has no minimum along a leg at one point, and one below zero at the next.
+    system = fl.System(friction, n=2)
+    found = []
+    for start in (0.4, 0.06):
+        cycle = fl.limit_cycle(system, [1.0, 2.0], {"omega": 0.42, "F": start})
+        branch = fl.continuation(cycle, "F", (0.05, 0.5))
+        found.append([(special.code, round(special.params["F"], 7)) for special in branch.special])
+    assert found[0] == found[1]
+    assert [code for code, _ in found[0]] == ["EP", "GS", "SS", "EP"]

@@ -14,13 +14,15 @@ import numpy as np
 from filippov.cycles.motions import Array
 from filippov.errors import ModelError
 
-__all__ = ["Curve", "Place", "Step", "corrected", "guess_through", "place_of", "tangent_of"]
+__all__ = ["Curve", "Place", "Step", "corrected", "guess_through", "nearest_in", "place_of", "tangent_of"]
 
 _TOLERANCE = 1e-11
 # A step that short is not made; that before it is as long as the root of it.
 _ARRIVED, _NEXT_IS_LAST = 1e-12, 1e-6
 _MOST_STEPS = 12
 _ABSURD, _NEAR = 1e4, 1e-7
+# Equations are nearly singular; a guess is near one of their solutions; what they leave is rounding.
+_SINGULAR, _NEAR_SINGULAR, _LEFT = 1e-7, 1e-2, 1e-10
 # A polynomial leads twice as far as its points are apart, if the cosine between their directions is as large.
 _FAR, _ALONG = 2.0, 0.5
 
@@ -139,7 +141,6 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
         If Newton's method does not converge.
     """
     plane = w / scale @ normal if level is None else level
-    w = w.copy()
     before = np.inf
     for count in range(1, _MOST_STEPS + 1):
         residual, jacobian = curve.equations(w, before < _NEXT_IS_LAST)
@@ -164,3 +165,36 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
             break
         before = size
     raise ModelError("Newton's method does not converge to a point of the branch")
+
+
+def nearest_in(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:
+    """Return the point of a curve in a plane, also where its equations are nearly singular.
+
+    There the point is the nearest one to the guess `w`: in the direction in which the equations say nothing
+    the guess stays as it is. The point solves them if what they leave in that direction is rounding.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge.
+    """
+    try:
+        return corrected(curve, w, scale, normal, level)
+    except ModelError as error:
+        plane = w / scale @ normal if level is None else level
+        for count in range(1, _MOST_STEPS + 1):
+            residual, jacobian = curve.equations(w)
+            matrix = np.vstack([jacobian * scale, normal])
+            right = np.append(residual, w / scale @ normal - plane)
+            if not np.all(np.isfinite(matrix)):
+                raise error
+            change, _, rank, _ = np.linalg.lstsq(matrix, -right, rcond=_SINGULAR)
+            size = float(np.max(np.abs(change)))
+            if rank == len(w) or not size < _NEAR_SINGULAR:
+                raise error
+            w = w + change * scale
+            if size < _TOLERANCE:
+                if np.any(np.abs(right) > _LEFT * np.sum(np.abs(matrix), axis=1)):
+                    raise error
+                return Step(w, jacobian, count, size)
+        raise

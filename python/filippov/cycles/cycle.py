@@ -38,6 +38,8 @@ __all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "in_parts", "limi
 
 _MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
+# The first run of a search is that short: how fast a system is shows in its steps.
+_SHORTEST_SPAN = 4.0**-15
 _SINGULAR, _ROUNDING = 1e-12, 1e-9
 
 
@@ -639,7 +641,7 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
 
 def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]:
     """Return a time span of many steps or switches, and the run over it."""
-    span = 1.0
+    span = _SHORTEST_SPAN
     while True:
         solution = motions.run((t0, t0 + span), x)
         if not solution.success:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from filippov.cycles.arclength import Place, Step, corrected, guess_through, place_of
+from filippov.cycles.arclength import Place, Step, corrected, guess_through, nearest_in, place_of
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.codimension_two import CODIMENSION_TWO
@@ -47,6 +47,9 @@ _STEP_BEHIND = 2e-3
 # So many places before the last one say where the next one is.
 _EARLIER = 2
 _WIDTH = 1e-13
+# Singular points are looked for in steps no longer than that, and between regular points that are nearer to
+# them by that part of the step.
+_SINGULAR_STEP, _BESIDE = 0.01, 0.05
 # Special points that near to each other, in the size of the range, are at one place.
 _TOGETHER = 1e-9
 # Motions that go away from a surface no faster stay beside it; at a pole of the speed it is larger.
@@ -345,6 +348,10 @@ class _Position(NamedTuple):
         return self._replace(place=place, tests=tests)
 
 
+# Points by their distance along a step.
+_Seen = dict[float, tuple[Step, _Position]]
+
+
 class _Side:
     """One direction of a branch."""
 
@@ -595,7 +602,7 @@ class _Side:
         curve, here, _ = self.here
         w, scale, tangent = here
         low, high = self.settings.bounds
-        step = corrected(curve, guess_through(here, self._places(), ds), scale, tangent)
+        step = nearest_in(curve, guess_through(here, self._places(), ds), scale, tangent)
         if not low <= step.w[-1] <= high:
             bound = low if step.w[-1] < low else high
             share = (bound - w[-1]) / (step.w[-1] - w[-1])
@@ -604,7 +611,16 @@ class _Side:
         if following.tangent @ tangent < 0.8 and ds > 1e-4:
             raise ModelError("the branch turns too far in one step")
         end = self._position_at(curve, following, step.jacobian)
+        if ds > 1e-4 and self._dips_anew(end):
+            raise ModelError("a guard has got a minimum within the step, and it is below zero")
         return self._at_pair_of_zeros(end) or (step, end)
+
+    def _dips_anew(self, end: _Position) -> bool:
+        """Whether a guard is negative along a leg at the end of a step, and had no minimum at its start."""
+        if not isinstance(end.curve, CycleCurve):
+            return False
+        anew = [key for key in end.tests if key[0] in CHANGES and key not in self.here.tests]
+        return any(key[3] == "inside" and end.tests[key] < -self._noise(key) for key in anew)
 
     def _places(self) -> list[Place]:
         return [position.place for position in self.earlier]
@@ -627,7 +643,7 @@ class _Side:
             seen: dict[float, tuple[Step, _Position]] = {}
 
             def value(s: float, key: Any = key, seen: Any = seen) -> float:
-                seen[s] = self._beside(s, (before if s < 0 else end).place)
+                seen[s] = self._beside(self.here, s, (before if s < 0 else end).place)
                 found: float = seen[s][1].tests.get(key, np.nan)
                 return found if abs(found) > self._noise(key) else 0.0
 
@@ -641,11 +657,13 @@ class _Side:
                 return seen[s]
         return None
 
-    def _beside(self, s: float, other: Place) -> tuple[Step, _Position]:
-        """Return the point at a distance along the tangent here, on the way to another point."""
-        curve, here, _ = self.here
+    def _beside(
+        self, start: _Position, s: float, other: Place, correct: Callable[..., Step] = corrected
+    ) -> tuple[Step, _Position]:
+        """Return the point at a distance along the tangent of a point, on the way to another one."""
+        curve, here, _ = start
         level = float(here.w / here.scale @ here.tangent)
-        step = corrected(curve, guess_through(here, [other], s), here.scale, here.tangent, level + s)
+        step = correct(curve, guess_through(here, [other], s), here.scale, here.tangent, level + s)
         place = place_of(curve, step.w, step.jacobian, here.tangent)
         return step, self._position_at(curve, place, step.jacobian)
 
@@ -667,7 +685,9 @@ class _Side:
             for key in self._wanted(before, after)
             if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > self._noise(key)
         ]
-        places = (self._located(self.here, key, following) for key in changed)
+        # In a shorter step the equations may be regular.
+        is_short = _along(self.here.place, following.place) < _SINGULAR_STEP
+        places = (self._located(self.here, key, following, is_short) for key in changed)
         # What vanishes together with a change of the itinerary comes before it.
         found = sorted(places, key=lambda at: at[0] + (_TOGETHER if at[1][0] in CHANGES else 0.0))
         curve = self.here.curve
@@ -748,33 +768,64 @@ class _Side:
         self.reason += f", at {CODES['PD']} {name} = {there.params[name]:.12g}"
         return True
 
-    def _located(self, start: _Position, key: Any, end: _Position) -> tuple[float, Any, Step]:
+    def _located(
+        self, start: _Position, key: Any, end: _Position, may_be_singular: bool = True
+    ) -> tuple[float, Any, Step]:
         """Return how far along a step a test function vanishes, which one, and the point."""
-        curve, here, tests = start
-        w, scale, tangent = here
-        level = float(w / scale @ tangent)
-        length = float(end.place.w / scale @ tangent) - level
-        nearest: list[tuple[float, float, Step]] = []
-
-        def value(s: float) -> float:
-            point = corrected(curve, guess_through(here, [end.place], s), scale, tangent, level + s)
-            following = place_of(curve, point.w, point.jacobian, tangent)
-            found = self._position_at(curve, following, point.jacobian).tests
-            if key not in found:
-                raise ModelError(f"the test function of {key[0]} is lost on the way")
-            if not nearest or abs(found[key]) <= nearest[0][0]:
-                nearest[:] = [(abs(found[key]), s, point)]
-            return found[key]
-
+        seen: _Seen = {}
         try:
-            zero_between(value, (0.0, tests[key]), (length, end.tests[key]), _WIDTH)
+            self._find_zero(start, key, end, seen, corrected)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
-            is_near = nearest and nearest[0][0] < 1e-6 * max(abs(tests[key]), abs(end.tests[key]))
-            if not nearest or (key[0] in CHANGES and not is_near):
+            ends = max(abs(start.tests[key]), abs(end.tests[key]))
+            is_near = any(abs(position.tests[key]) < 1e-6 * ends for _, position in seen.values())
+            if key[0] in CHANGES and not is_near:
+                if not may_be_singular:
+                    raise
+                return self._located_where_singular(start, key, end, seen)
+            if not seen:
                 raise
-        _, s, point = nearest[0]
-        return s, key, point
+        s = _nearest_to_zero(seen, key)
+        return s, key, seen[s][0]
+
+    def _find_zero(
+        self, start: _Position, key: Any, end: _Position, seen: _Seen, correct: Callable[..., Step]
+    ) -> None:
+        """Find where a test function vanishes along a step; `seen` takes the points by their distances."""
+
+        def value(s: float) -> float:
+            found = self._beside(start, s, end.place, correct)
+            if key not in found[1].tests:
+                raise ModelError(f"the test function of {key[0]} is lost on the way")
+            seen[s] = found
+            return found[1].tests[key]
+
+        length = _along(start.place, end.place)
+        zero_between(value, (0.0, start.tests[key]), (length, end.tests[key]), _WIDTH)
+
+    def _located_where_singular(
+        self, start: _Position, key: Any, end: _Position, seen: _Seen
+    ) -> tuple[float, Any, Step]:
+        """Return it where the equations are singular: between two points around it where they are not."""
+        first, regular = start, [position for _, position in seen.values()]
+        low, high = (
+            min((end, *regular), key=lambda one: abs(one.tests[key]) if one.tests[key] * sign > 0 else np.inf)
+            for end, sign in ((start, start.tests[key]), (end, end.tests[key]))
+        )
+        length = _along(low.place, high.place)
+        zero = length * low.tests[key] / (low.tests[key] - high.tests[key])
+        around = [low, high]
+        for k, s in enumerate((zero - _BESIDE * length, zero + _BESIDE * length)):
+            try:
+                _, one = self._beside(low, s, high.place)
+            except ModelError:
+                continue
+            if 0.0 < s < length and one.tests.get(key, np.nan) * around[k].tests[key] > 0:
+                around[k] = one
+        nearer: _Seen = {}
+        self._find_zero(around[0], key, around[1], nearer, nearest_in)
+        s = _nearest_to_zero(nearer, key)
+        return _along(first.place, around[0].place) + s, key, nearer[s][0]
 
     def _add(self, code: str, key: Any, curve: AnyCurve, state: State, secant: Array | None = None) -> None:
         """Take down a special point, on a secant of the branch."""
@@ -958,6 +1009,17 @@ def _way_from(special: Special, place: Place, first: State) -> float:
     there = state.y if isinstance(state, Equilibrium) else state.from_event().y0
     n = len(there)
     return float(np.sign(place.tangent[:n] @ ((place.w[:n] - there) / place.scale[:n])))
+
+
+def _along(place: Place, other: Place) -> float:
+    """Return how far another place is along the tangent of a place."""
+    return float((other.w - place.w) / place.scale @ place.tangent)
+
+
+def _nearest_to_zero(seen: _Seen, key: Any) -> float:
+    """Return the distance at which a test function was seen nearest to zero, the last one of those."""
+    found: float = min(reversed(seen), key=lambda s: abs(float(seen[s][1].tests[key])))
+    return found
 
 
 def _summary(curve: AnyCurve, place: Place) -> Array:

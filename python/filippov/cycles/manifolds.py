@@ -204,7 +204,7 @@ def _along_eigenvector(start: Equilibrium, which: str, length: float, side: int)
     values, vectors = np.linalg.eig(curve.linearisation(w))
     k = int(np.argmax(values.real) if which == "unstable" else np.argmin(values.real))
     vector = _oriented(curve.tangents(w) @ vectors[:, k].real)
-    size = max(float(np.max(np.abs(start.y))), 1e-2 * length)
+    size = _size_of(start.y, length)
     x = start.y + side * _START * size * vector
     if curve.sliding:
         normals = curve.normals(w)
@@ -222,9 +222,14 @@ def _beside_surface(start: Equilibrium, which: str, length: float, side: int) ->
     curve.use(w)
     velocity = curve.motions.right_hand_side(0.0, start.y, signs)[: curve.n]
     speed = float(np.linalg.norm(velocity))
-    size = max(float(np.max(np.abs(start.y))), 1e-2 * length)
+    size = _size_of(start.y, length)
     sense = 1.0 if which == "unstable" else -1.0
     return start.y + sense * _START * size * velocity / speed, length / speed
+
+
+def _size_of(point: Array, length: float) -> float:
+    """Return the size of an equilibrium or cycle: that of its state, but neither far more nor less than the curve."""
+    return min(max(float(np.max(np.abs(point))), 1e-2 * length), length)
 
 
 def _oriented(vector: Array) -> Array:
@@ -339,7 +344,7 @@ def _images(
     """Return the images of a segment along the eigenvector, one after the other, without large gaps."""
     turns = 1 if multiplier > 0.0 else 2  # with a negative multiplier two returns come back to the side
     growth = abs(multiplier) ** turns
-    size = max(float(np.max(np.abs(returns.point))), 1e-2 * length)
+    size = _size_of(returns.point, length)
     largest = _GAP * min(length, 2.0 * size)
     orbits: dict[float, list[Array]] = {}
 

@@ -33,6 +33,8 @@ _ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
 _SOLVED = 1e-11
 # A leg that vanishes may last for less than nothing by rounding.
 _NOTHING = 1e-11
+# A state that is such a part of the largest one is at zero.
+_AT_ZERO = 1e-9
 # A cycle whose velocities fall to such a share is an equilibrium.
 _SHRUNK = 1e-6
 
@@ -125,10 +127,9 @@ class Shot:
             for i, t in enumerate(times)
         ]
 
-    @property
-    def growths(self) -> Array:
-        """How much small changes of the state may grow along each leg, at most."""
-        columns = self._rows[2]
+    def growths(self, sizes: Array) -> Array:
+        """Return how much small changes of the state, by their sizes, may grow along each leg, at most."""
+        columns = self._rows[2] * (sizes[:, None] / sizes)
         return np.asarray(np.sqrt(np.einsum("ijk,ijk->i", columns, columns)))
 
     @property
@@ -295,7 +296,7 @@ def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] 
 
     In one piece the growth takes the digits of the equations (Ascher, Mattheij, Russell 1995, chapter 4).
     """
-    growths = shot.growths.tolist()
+    growths = shot.growths(scales(shooting, u)[: shooting.n]).tolist()
     if not np.isfinite(growths).all() or max(growths) < _GROWTH:
         return None
     itinerary, motions = shooting.itinerary(u), shooting.motions
@@ -316,7 +317,10 @@ def divided(shooting: Shooting, u: Array, shot: Shot) -> tuple[Shooting, Array] 
         t += duration
     parts = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
     finer = Shooting(motions, parts, shooting.period)
-    return finer, finer.unknowns(parts)
+    own = finer.unknowns(parts)
+    # What does not become smaller in parts are the units of the states.
+    left = finer.shoot(own).growths(scales(finer, own)[: finer.n])
+    return (finer, own) if np.max(left) < 0.5 * max(growths) else None
 
 
 def scales(shooting: Shooting, u: Array) -> Array:
@@ -325,8 +329,11 @@ def scales(shooting: Shooting, u: Array) -> Array:
     # A state that is small where the legs start is not small in between.
     size = np.maximum(np.max(np.abs(starts), axis=0), shooting.swing)
     largest = float(np.max(size))
-    # A cycle that rests at the origin has no size of its own.
-    size = np.maximum(size, 1e-3 * largest if largest > shooting.motions.negligible else 1.0)
+    # What rests at zero has no size of its own; a small size may be one of other units.
+    if largest > shooting.motions.negligible:
+        size = np.where(size > _AT_ZERO * largest, size, 1e-3 * largest)
+    else:
+        size = np.ones_like(size)
     period = float(sum(durations))
     parts = [np.tile(size, shooting.m), np.full(shooting.m, period)]
     if shooting.is_free_in_time:
@@ -366,8 +373,9 @@ def solve(
             if is_singular and np.any(np.abs(shot.residual) > 1e-8 * (np.abs(jacobian) @ scale)):
                 break
             found = shooting.shoot(u)
-            moves = found.fastest * sum(shooting.parts(u)[1])
-            rests = found.fastest < _SHRUNK * at_first or moves <= _SHRUNK * float(np.max(np.abs(u)))
+            starts, durations, _ = shooting.parts(u)
+            moves = found.fastest * sum(durations)
+            rests = found.fastest < _SHRUNK * at_first or moves <= _SHRUNK * float(np.max(np.abs(starts)))
             if rests and shooting.period is None:
                 raise ModelError("Newton's method leads to an equilibrium, and to no cycle")
             return u, found, size
