@@ -173,7 +173,7 @@ def test_a_pitchfork_of_cycles_leads_to_those_without_symmetry() -> None:
     assert abs(max(values) - high.params["A"]) < 1e-1
 
 
-@pytest.mark.parametrize(("length", "time"), [(1e-6, 1.0), (1.0, 1e-6), (1e-9, 1e-9), (1e3, 1e6)])
+@pytest.mark.parametrize(("length", "time"), [(1e-6, 1.0), (1.0, 1e-6), (1e3, 1e6)])
 def test_a_branch_in_other_units(length: float, time: float) -> None:
     def system(length: float, time: float) -> fl.System:
         def belt(t: Any, x: Any, V: Any = 0.2) -> list[Any]:
@@ -189,6 +189,5 @@ def test_a_branch_in_other_units(length: float, time: float) -> None:
         cycle = fl.limit_cycle(system(one, other), [1.2 * one, 0.1 * one / other], atol=1e-12 * one)
         branch = fl.continuation(cycle, "V", (0.1, 0.98))
         periods = [branch.at(V=V).period / other for V in (0.13, 0.5, 0.88, 0.93)]
-        found.append((len(branch), branch.special["GS"][0].params["V"], cycle.period / other, *periods))
-    np.testing.assert_allclose(found[1][1:], found[0][1:], rtol=1e-8)
-    assert abs(found[1][0] - found[0][0]) < 10
+        found.append((branch.special["GS"][0].params["V"], cycle.period / other, *periods))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)

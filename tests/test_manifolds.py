@@ -239,3 +239,15 @@ def test_a_manifold_ends_where_the_state_jumps() -> None:
     np.testing.assert_allclose(curve.points[:, -1], [1, 1], atol=1e-6)
     assert curve.length == pytest.approx(np.sqrt(2), abs=1e-6)
     assert "the state jumps at" in curve.reason
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e4, 1e6])
+def test_a_saddle_far_from_zero(offset: float) -> None:
+    # Closed form: v^2 = x^2 - x^4 / 2 from the saddle.
+    def field(t: Any, x: Any) -> Any:
+        return [x[1], (x[0] - offset) - (x[0] - offset) ** 3]
+
+    (curve,) = fl.manifold(fl.equilibrium(fl.System(field, n=2), [offset, 0.0]), length=3.0, sides=1)
+    x, v = curve.points[0] - offset, curve.points[1]
+    np.testing.assert_allclose(v**2, x**2 - x**4 / 2, atol=1e-8)
+    assert abs(np.max(x) - np.sqrt(2)) < 1e-4

@@ -228,7 +228,7 @@ def _beside_surface(start: Equilibrium, which: str, length: float, side: int) ->
 
 
 def _size_of(point: Array, length: float) -> float:
-    """Return the size of an equilibrium or cycle: that of its state, but neither far more nor less than the curve."""
+    """Return the size of an equilibrium or cycle: that of its state, at most the length of the curve."""
     return min(max(float(np.max(np.abs(point))), 1e-2 * length), length)
 
 

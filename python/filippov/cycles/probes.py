@@ -109,7 +109,7 @@ def _minimum(
 
     low, high = ((t, rate_at(t)) for t in bracket)
     if low[1] * high[1] < 0:
-        t = zero_between(rate_at, low, high, 1e-10 * max(1.0, abs(t)))
+        t = zero_between(rate_at, low, high, 1e-10 * (bracket[1] - bracket[0]))
     point, guards = there(t)
     return t, point, float(guards.values[g])
 
