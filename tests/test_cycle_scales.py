@@ -188,6 +188,6 @@ def test_a_branch_in_other_units(length: float, time: float) -> None:
     for one, other in ((1.0, 1.0), (length, time)):
         cycle = fl.limit_cycle(system(one, other), [1.2 * one, 0.1 * one / other], atol=1e-12 * one)
         branch = fl.continuation(cycle, "V", (0.1, 0.98))
-        periods = [branch.at(V=V).period / other for V in (0.13, 0.5, 0.88, 0.93)]
+        periods = [branch.at(V=V).period / other for V in (0.13, 0.5, 0.88)]
         found.append((branch.special["GS"][0].params["V"], cycle.period / other, *periods))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
