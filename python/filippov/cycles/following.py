@@ -685,7 +685,7 @@ class _Side:
             for key in self._wanted(before, after)
             if after[key] * before[key] < 0 and max(abs(after[key]), abs(before[key])) > self._noise(key)
         ]
-        # In a shorter step the equations may be regular.
+        # Only in a short step a zero counts as singular: from a shorter one Newton's method may converge.
         is_short = _along(self.here.place, following.place) < _SINGULAR_STEP
         places = (self._located(self.here, key, following, is_short) for key in changed)
         # What vanishes together with a change of the itinerary comes before it.
@@ -806,7 +806,7 @@ class _Side:
     def _located_where_singular(
         self, start: _Position, key: Any, end: _Position, seen: _Seen
     ) -> tuple[float, Any, Step]:
-        """Return it where the equations are singular: between two points around it where they are not."""
+        """Return what `_located` does, where the equations are singular, from regular points on both sides."""
         first, regular = start, [position for _, position in seen.values()]
         low, high = (
             min((end, *regular), key=lambda one: abs(one.tests[key]) if one.tests[key] * sign > 0 else np.inf)

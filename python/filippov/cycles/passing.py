@@ -69,8 +69,9 @@ def beyond_change(
             return new
         # Another cycle, far away, does not come nearer with the step.
         nearer = found_at(0.1 * reach)
-        is_same = nearer is not None and nearer[0].itinerary.is_same(new.itinerary)
-        if nearer is not None and is_same and nearer[1] < 0.6 * distance:
+        if nearer is None or not nearer[0].itinerary.is_same(new.itinerary):
+            continue
+        if nearer[1] < 0.6 * distance:
             return new
     return None
 
