@@ -806,7 +806,7 @@ class _Side:
     def _located_where_singular(
         self, start: _Position, key: Any, end: _Position, seen: _Seen
     ) -> tuple[float, Any, Step]:
-        """Return what `_located` does, where the equations are singular, from regular points on both sides."""
+        """Return what `_located` does where the equations are singular, from regular points on both sides."""
         first, regular = start, [position for _, position in seen.values()]
         low, high = (
             min((end, *regular), key=lambda one: abs(one.tests[key]) if one.tests[key] * sign > 0 else np.inf)
