@@ -157,7 +157,17 @@ def test_other_systems_are_refused() -> None:
 
 
 def test_an_equilibrium_whose_multipliers_hold_no_motion_is_shown() -> None:
-    """Beside phi = 0 the force of the relay is a kink of the surface phi = 0, which it cannot hold."""
+    # The relay acts on the speed of the position that switches it.
+    relay = fl.System(lambda t, x: [x[1], -np.sign(x[0])], n=2)
+    (rest,) = fl.equilibria(relay, [(-1, 1), (-1, 1)])
+    assert rest.codimension == 1
+    assert np.isnan(rest.eigenvalues).all()
+    assert not rest.is_stable
+    assert repr(rest).startswith("Equilibrium(neutral pseudo-equilibrium at (0, 0)")
+
+
+def test_lines_end_at_a_kink_of_a_surface() -> None:
+    """At phi = 0 the force of the relay is a kink of the surface w = 0: nothing is at rest by it."""
 
     @fl.system(states=("phi", "w"))
     def swing(t, x, friction=0.05, push=0.12):
@@ -166,10 +176,10 @@ def test_an_equilibrium_whose_multipliers_hold_no_motion_is_shown() -> None:
 
     found = fl.equilibria(swing, {"phi": (-1, 1), "w": (-1, 1)})
     assert not found.certified  # they fill a line
-    corner = [point for point in found if point.codimension == 2]
-    assert corner
-    assert all(len(point.eigenvalues) == 0 and not point.is_stable for point in corner)
-    assert repr(found).count("Equilibrium(") == len(found)
+    assert not [point for point in found if point.codimension == 2]
+    ends = np.sort([line.y[0, [0, -1]] for line in found.lines])
+    end = np.arcsin(0.07)
+    np.testing.assert_allclose(ends[np.argsort(ends[:, 0])], [[-end, 0.0], [0.0, end]], atol=1e-9)
 
 
 def test_eigenvalues_of_states_of_other_sizes() -> None:

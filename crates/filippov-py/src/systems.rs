@@ -497,6 +497,20 @@ impl TracedSystem {
         surface < self.system.n_surfaces() && self.system.switches_at(surface)
     }
 
+    /// Whether the field may jump at a surface in a mode; if not, the field has a kink there, or is smooth.
+    fn jumps_across(&self, surface: usize, mode: Array<'_>) -> PyResult<bool> {
+        let mode = mode.as_slice()?;
+        if mode.len() != self.n_visible() || surface >= mode.len() {
+            return Err(PyValueError::new_err(
+                "mode: one entry per surface is needed",
+            ));
+        }
+        let sliding: Vec<usize> = (0..mode.len()).filter(|&j| mode[j] == 0.0).collect();
+        let mut signs = mode.to_vec();
+        signs.resize(self.system.n_surfaces(), 1.0);
+        Ok(self.system.jumps_across(surface, &signs, &sliding))
+    }
+
     fn is_native(&self) -> bool {
         self.system.is_native()
     }

@@ -41,7 +41,7 @@ const UNDECIDED: f64 = 1e-6;
 const STEP: f64 = 6e-6;
 
 /// The equilibria in the window: those of the regions seen there, those on one surface each, and those where surfaces meet.
-/// A point on the border of its region is not among them: it is the end of sliding, or of sticking.
+/// A point on the border of its region is not among them if the field jumps there: it is the end of sliding, or of sticking.
 pub fn equilibria(
     plane: &Plane,
     parts: &[SheetPart],
@@ -54,8 +54,14 @@ pub fn equilibria(
             let is_near = window.distance(window.point(&known.y), window.point(&new.y)) <= SAME;
             known.surfaces == new.surfaces && is_near && known.is_admissible == new.is_admissible
         };
-        if window.contains(window.point(&new.y)) && !found.iter().any(is_same) {
-            found.push(new);
+        if !window.contains(window.point(&new.y)) {
+            return;
+        }
+        match found.iter().position(is_same) {
+            // On a kink the linear terms of all regions count.
+            Some(known) if found[known].is_stable != new.is_stable => found[known].is_stable = None,
+            Some(_) => {}
+            None => found.push(new),
         }
     };
     let mut regions: Vec<Vec<f64>> = Vec::new();
@@ -80,11 +86,12 @@ pub fn equilibria(
             let Some((x, jacobian)) = balance.solve(x.clone())? else {
                 continue;
             };
-            if plane.is_on_surface(&x, signs, n_visible)? {
+            let at = plane.surfaces_at(&x, signs, n_visible)?;
+            if at.iter().any(|&j| plane.system.jumps_across(j, signs, &[])) {
                 continue;
             }
             let own = plane.signs(&x)?;
-            let is_admissible = own[..n_visible] == signs[..n_visible];
+            let is_admissible = (0..n_visible).all(|j| own[j] == signs[j] || at.contains(&j));
             add(Equilibrium {
                 is_stable: stability(&jacobian),
                 is_admissible,

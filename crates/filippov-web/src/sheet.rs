@@ -108,23 +108,29 @@ impl Plane<'_> {
         Ok(self.window.point(&dx))
     }
 
-    /// Is a state on one of the first `n` surfaces, to a small share of the window?
-    pub fn is_on_surface(&self, x: &[f64], signs: &[f64], n: usize) -> Result<bool, FieldError> {
+    /// Those of the first `n` surfaces that a state is on, to a small share of the window.
+    pub fn surfaces_at(
+        &self,
+        x: &[f64],
+        signs: &[f64],
+        n: usize,
+    ) -> Result<Vec<usize>, FieldError> {
         let place = Setting::new(signs, self.q).at(self.t, x);
         let mut h = vec![0.0; signs.len()];
         self.system.surfaces(&place, &mut h)?;
         let (mut gradient, mut active) = (vec![0.0; x.len()], vec![true; signs.len()]);
         self.system.active(signs, &[], &mut active);
+        let mut found = Vec::new();
         for j in (0..n).filter(|&j| active[j]) {
             self.system.gradient(j, &place, &mut gradient)?;
             let axes = self.window.axes.into_iter().enumerate();
             let across = axes
                 .map(|(k, axis)| gradient[axis].abs() * (self.window.high[k] - self.window.low[k]));
             if h[j].abs() <= ON_SURFACE * across.sum::<f64>() {
-                return Ok(true);
+                found.push(j);
             }
         }
-        Ok(false)
+        Ok(found)
     }
 
     /// The parts of the first `n` surfaces in the window.

@@ -128,7 +128,8 @@ def equilibria(
     Notes
     -----
     An equilibrium on the border of its region, or a pseudo-equilibrium at the end of its sliding segment, may
-    be in the list once, twice, or not at all. There, at folds, and where equilibria fill a line, nothing is
+    be in the list once, twice, or not at all; where the field does not jump at the border (`kinks`), once,
+    with the side +1. At borders where it jumps, at folds, and where equilibria fill a line, nothing is
     proved: `unresolved` has these places, and `lines` the lines that were found. Rest in contact with a
     surface of resets is not looked for, and nothing is certified for systems with resets.
 
@@ -229,16 +230,21 @@ class _Search(NamedTuple):
         rounding = 1e-12 * (self.high - self.low)
         if np.any(point.y < self.low - rounding) or np.any(point.y > self.high + rounding):
             return False
+        curve, mode = point._curve, point.mode
+        if any(curve.has_kink(j, point._w) for j in curve.sliding):
+            return False  # it is one of the modes on both sides
         if not self.virtual:
-            return point.is_admissible and self._is_on_its_sides(point, range(len(point.mode)))
-        active = self.core.active(np.array(tuple(point.mode), dtype=np.float64))
-        return self._is_on_its_sides(point, [j for j, is_active in enumerate(active) if not is_active])
+            return point.is_admissible and self._is_on_its_sides(point, range(len(mode)))
+        active = self.core.active(np.array(tuple(mode), dtype=np.float64))
+        hidden = [j for j, is_active in enumerate(active) if not is_active]
+        return self._is_on_its_sides(point, [*hidden, *point.kinks])
 
     def _is_on_its_sides(self, point: Equilibrium, surfaces: Sequence[int]) -> bool:
-        """Whether an equilibrium lies in its mode; of several modes with the same field, one counts."""
+        """Whether an equilibrium lies in its mode; of several modes with the same field there, one counts."""
         mode = point.mode
         signs = np.array([1.0 if entry == 0 else float(entry) for entry in mode])
         h = self.motions.right_hand_side(0.0, point.y, signs)[self.n :]
+        h[list(point.kinks)] = 0.0
         return all(mode[j] == 0 or (h[j] >= 0) == (mode[j] > 0) for j in surfaces)
 
     def states_of(self, low: Array, high: Array) -> Array:
@@ -257,8 +263,9 @@ def _modes(search: _Search) -> Iterator[tuple[int, ...]]:
                 mode = [0] * n_surfaces
                 for j, sign in zip(others, signs, strict=True):
                     mode[j] = sign
-                active = core.active(np.array(mode, dtype=np.float64))
-                if not all(active[j] for j in sliding):
+                entries = np.array(mode, dtype=np.float64)
+                active = core.active(entries)
+                if not all(active[j] and core.jumps_across(j, entries) for j in sliding):
                     continue
                 yield tuple(mode)
                 count += 1

@@ -64,11 +64,13 @@ def coefficient_of(
     coefficient : float
         Up to a positive factor, by which it has no units: positive for unstable cycles at a Hopf point and
         for unstable tori, negative for unstable cycles at a period doubling. NaN where the motion has no
-        derivatives.
+        derivatives, as on a kink of the field.
     width : float
         That used. With the same width it is smooth along a curve.
     """
     if isinstance(curve, EquilibriumCurve):
+        if curve.kinks(w):
+            return np.nan, width or _WIDTH
         beside = _beside_pseudo_equilibrium if curve.sliding else _beside_equilibrium
         derivative, form, rounding = beside(curve, w), _hopf, _ROUNDING_OF_FIELDS
     else:

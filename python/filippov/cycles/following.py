@@ -55,6 +55,8 @@ _TOGETHER = 1e-9
 # Motions that go away from a surface no faster stay beside it; at a pole of the speed it is larger.
 _NO_SPEED = 1e-6
 _SAME_HALVES, _NOISE = 1e-9, 1e-10
+# What is larger than zero and smaller than rounding.
+_LEAST = 1e-300
 # A cycle that grows tenfold so often, to an asymptote, grows without bound; so does a period while the
 # parameter stands still.
 _TENFOLDS, _STANDS = 4, 1e-8
@@ -360,11 +362,18 @@ class _Side:
         self.points: list[Point] = []
         self.special: list[Special] = []
         self.reason, self.is_stopped, self.is_closed = "interrupted", False, False
-        self.here: _Position
         # The positions before this one with the same itinerary, the latest first.
         self.earlier: list[_Position] = []
-        self.start = self._position(start, direction)
+        self.here = self._position(start, direction)
+        # An equilibrium on the boundary of its mode is admissible on one of the two sides at most.
+        tests = self.here.tests
+        inside = {key: max(abs(tests[key]), _LEAST) for key in tests if self._is_boundary(key)}
+        self.start = self.here._replace(tests={**tests, **inside})
         self._go_on(self.start, start)
+
+    def _is_boundary(self, key: Any) -> bool:
+        """Whether an equilibrium is on this boundary of its mode."""
+        return key[0] == "BE" and abs(self.here.tests[key]) <= self._noise(key)
 
     def _position(self, state: State, direction: float) -> _Position:
         """Return the position of a state, from which the parameter goes in a direction."""

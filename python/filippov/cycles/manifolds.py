@@ -166,6 +166,8 @@ def _of_equilibrium(
         raise InputError(f"start: {what} is not hyperbolic: an eigenvalue has no real part")
     sense = 1.0 if which == "unstable" else -1.0
     own = int(np.count_nonzero(sense * values.real > 0.0))
+    if start._cones is not None:
+        raise InputError("start: the linear terms differ on the sides of a kink: there are no eigenvectors")
     m = start.codimension
     leads = m > 0 and start.attracts == (which == "stable")  # trajectories beside the surface belong to it
     if m > 1 and not start.attracts:

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from filippov._core import ModeBounds, TracedSystem
 from filippov.analysis.observe import check_keywords
+from filippov.cycles.cones import Stability, are_alike, stability_in_cones
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.meeting import speed_away
 from filippov.cycles.motions import Array, Motions
@@ -43,6 +44,10 @@ _TOLERANCE = 1e-13
 _REGULAR = 1e8
 # A jump of the field is none below this part of its changes over the size of the states.
 _NO_JUMP = 1e-9
+# A switching function is zero below this part of its changes over the size of the states.
+_AT_SURFACE = 1e-9
+# The field is compared in all regions that so many surfaces divide.
+_MOST_KINKS = 8
 # Real parts of eigenvalues below this part of the largest eigenvalue are rounding.
 _ROUNDING = 1e-12
 # Differences are exact to this part of a row.
@@ -92,11 +97,24 @@ class Equilibrium:
         """The switching functions, each in the sense of the mode: positive where it is admissible."""
         return self._curve.switching(self._w)
 
+    @cached_property
+    def kinks(self) -> tuple[int, ...]:
+        """Surfaces on which it lies while the field does not jump there, as with ``v * abs(v)`` at ``v = 0``.
+
+        It is one equilibrium then of the modes on all sides of them.
+        """
+        return self._curve.kinks(self._w)
+
     @property
     def is_admissible(self) -> bool:
-        """Whether the system is there: in its region, and with multipliers between -1 and 1; else virtual."""
-        inside = np.all(np.abs(self.multipliers) <= 1.0)
-        return bool(inside and np.all(self.switching > 0))
+        """Whether the system is there: in its region, and with multipliers between -1 and 1; else virtual.
+
+        A kink belongs to the regions on both sides.
+        """
+        if np.any(np.abs(self.multipliers) > 1.0):
+            return False
+        outside = [j for j, h in zip(self._curve.surfaces_beside(), self.switching, strict=True) if not h > 0]
+        return not outside or set(outside) <= set(self.kinks)
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
@@ -130,18 +148,38 @@ class Equilibrium:
         return self.stability == "stable"
 
     @cached_property
-    def stability(self) -> str:
+    def stability(self) -> Stability:
         """What is known of it to first order.
 
         ``"stable"``: all eigenvalues have negative real parts, and its surfaces attract. ``"unstable"``: one
         has a positive real part, or a surface repels. ``"neutral"``: neither, as for centres, lines of
         equilibria, and meetings of surfaces that motions circle at a constant distance; terms of higher
         order decide.
+
+        On a kink (`kinks`) the linear parts on its sides may differ. Then eigenvectors in their own regions
+        decide, and with two states the growth over a turn. With more states it is ``"neutral"`` if these say
+        nothing.
         """
-        most = [_largest_real_part(self.eigenvalues), self._most_beside]
-        if any(value > 0 for value in most):
+        if self._most_beside > 0:
             return "unstable"
-        return "stable" if all(value < 0 for value in most) else "neutral"
+        along = self._along_its_surfaces
+        return "neutral" if along == "stable" and not self._most_beside < 0 else along
+
+    @cached_property
+    def _along_its_surfaces(self) -> Stability:
+        """The stability of its motion in its region or on its surfaces."""
+        if self._cones is not None:
+            return stability_in_cones(*self._cones)
+        most = _largest_real_part(self.eigenvalues)
+        return "unstable" if most > 0 else "stable" if most < 0 else "neutral"
+
+    @cached_property
+    def _cones(self) -> tuple[dict[tuple[int, ...], Array], Array] | None:
+        """The linear parts around kinks, and the normals of these; None if there is one linear part."""
+        if not self.kinks or not np.all(np.isfinite(self.eigenvalues)):
+            return None
+        matrices, normals = self._curve.around_kinks(self.kinks, self._w)
+        return None if are_alike(matrices) else (matrices, normals)
 
     def in_parameters(self, names: Sequence[str], sizes: Sequence[float]) -> tuple[EquilibriumCurve, Array]:
         """Return its equations with some parameters as further unknowns, and the point itself."""
@@ -277,6 +315,59 @@ class EquilibriumCurve:
         h = self.motions.right_hand_side(0.0, w[: self.n], signs)[self.n :]
         kept = [j for j, entry in enumerate(self.mode) if entry != 0 and self._active[j]]
         return np.array([h[j] * self.mode[j] for j in kept])
+
+    def kinks(self, w: Array) -> tuple[int, ...]:
+        """Return the surfaces not slid on that pass through a point and at which the field does not jump."""
+        near = self._surfaces_at(w)[:_MOST_KINKS]
+        if not near:
+            return ()
+        scale = self.scales(w)[: self.n_unknowns]
+        least = _NO_JUMP * np.max(np.abs(self._by_unknowns(w)[: self.n] * scale), axis=1)
+        sides = itertools.product((-1, 1), repeat=len(near))
+        fields = {ends: self._beyond(near, ends).residual(w)[: self.n] for ends in sides}
+
+        def is_kink(k: int) -> bool:
+            jumps = (fields[ends] - fields[(*ends[:k], -1, *ends[k + 1 :])] for ends in fields if ends[k] > 0)
+            return all(bool(np.all(np.abs(jump) <= least)) for jump in jumps)
+
+        return tuple(j for k, j in enumerate(near) if is_kink(k))
+
+    def around_kinks(self, kinks: Sequence[int], w: Array) -> tuple[dict[tuple[int, ...], Array], Array]:
+        """Return the matrices of the motions on the sides of kinks, and the normals of these.
+
+        Both are in the basis of `tangents`.
+        """
+        sides = itertools.product((-1, 1), repeat=len(kinks))
+        matrices = {ends: self._beyond(kinks, ends).linearisation(w) for ends in sides}
+        return matrices, self._gradients(w)[list(kinks)] @ self.tangents(w)
+
+    def _surfaces_at(self, w: Array) -> list[int]:
+        """Return the surfaces not slid on that pass through a point."""
+        beside = self.surfaces_beside()
+        if not beside:
+            return []
+        sizes = np.abs(self._gradients(w)) @ self.scales(w)[: self.n]
+        values = zip(beside, self.switching(w), strict=True)
+        return [j for j, h in values if abs(h) <= _AT_SURFACE * sizes[j]]
+
+    def _gradients(self, w: Array) -> Array:
+        """Return the derivatives of all switching functions by the states, a row for each."""
+        _, signs = self._corners[0]
+
+        def functions(x: Array) -> Array:
+            return self.motions.right_hand_side(0.0, x, signs)[self.n :]
+
+        self.use(w)
+        return differences(functions, w[: self.n], self.scales(w)[: self.n], is_fine=True)
+
+    def _beyond(self, surfaces: Sequence[int], ends: Sequence[int]) -> EquilibriumCurve:
+        """Return the equations of the mode on other sides of surfaces."""
+        mode = list(self.mode)
+        for j, end in zip(surfaces, ends, strict=True):
+            mode[j] = end
+        found = EquilibriumCurve(self.motions, mode, self.names, self.sizes.tolist())
+        found.sizes_of_states = self.sizes_of_states
+        return found
 
     def has_kink(self, surface: int, w: Array) -> bool:
         """Whether the field does not jump at one of the surfaces slid on: its multiplier does nothing."""
@@ -449,6 +540,12 @@ def equilibrium(
     w = np.append(start, first_multipliers(curve, start))
     found = rest_of(curve, w)
     refuse_without_equilibria(motions, found.y[None])
+    smooth = [motions.prepared.surfaces[j] for j in curve.sliding if curve.has_kink(j, found._w)]
+    if smooth:
+        raise ModelError(
+            f"no pseudo-equilibrium in mode {found.mode} was found: the field does not jump at "
+            f"{', '.join(smooth)} = 0. There is an equilibrium of both sides at {_numbers(found.y)}"
+        )
     return found
 
 

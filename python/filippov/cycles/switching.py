@@ -75,10 +75,16 @@ def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
     largest = float(np.max(np.abs(state.y)))
     # At the origin the equilibrium has no size to compare with.
     extent = largest if largest > motions.negligible else 1.0
+    period = 2 * np.pi / frequency
     for share in (1e-2, 1e-3, 1e-1, 1e-4, 1e-5, 1e-6):
         start = state.y + share * extent * along
         leg = Leg(own.mode, discrete, None)
-        itinerary = Itinerary((leg,), 0.0, (start,), (2 * np.pi / frequency,))
+        itinerary: Itinerary | None = Itinerary((leg,), 0.0, (start,), (period,))
+        if state.kinks:
+            # It switches there each time that it passes.
+            itinerary = itinerary_from_event(motions.record((0.0, 2.5 * period), start), period)
+        if itinerary is None:
+            continue
         shooting = Shooting(motions.copy(), itinerary, None)
         u = shooting.unknowns(itinerary)
         try:
@@ -86,7 +92,7 @@ def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
             scale = curve.scales(curve.start)
             # The amplitude is kept, and the parameter follows from it.
             across = np.zeros(len(curve.start))
-            across[: len(along)] = along
+            across[: len(along)] = itinerary.starts[0] - state.y
             step = corrected(curve, curve.start, scale, across / np.linalg.norm(across))
             found = curve.state(step.w, step.error)
         except ModelError:

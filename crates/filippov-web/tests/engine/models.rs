@@ -124,6 +124,17 @@ pub fn two_nodes() -> Model {
     Model::from_bytes(&saved(g, field, names(&["x", "y"], &[]), &[]).to_bytes()).unwrap()
 }
 
+/// A saddle and two centres, held back by a force in proportion to the square of the speed: the field has a kink at y = 0.
+pub fn quadratic_drag() -> Model {
+    let mut g = Graph::new();
+    let (x, y) = (g.state(0), g.state(1));
+    let (squared, size) = (g.mul(x, x), g.abs(y));
+    let (cubed, drag) = (g.mul(squared, x), g.mul(y, size));
+    let force = g.sub(x, cubed);
+    let field = vec![y, g.sub(force, drag)];
+    Model::from_bytes(&saved(g, field, names(&["x", "y"], &[]), &[]).to_bytes()).unwrap()
+}
+
 /// A ball that falls on a table and loses a part of its speed.
 pub fn ball() -> Model {
     let mut g = Graph::new();

@@ -1,6 +1,6 @@
 //! Phase planes.
 
-use super::models::{ask, ball, friction, oscillator, sliding, two_nodes, Reply};
+use super::models::{ask, ball, friction, oscillator, quadratic_drag, sliding, two_nodes, Reply};
 
 fn parts(reply: &Reply, kind: &str) -> Vec<Vec<[f64; 2]>> {
     let all = reply.header["parts"].as_array().unwrap().iter();
@@ -57,6 +57,25 @@ fn a_pseudo_equilibrium_is_found_with_its_stability() {
     // Along the surface x' = a - lambda = a - (b - x) / 2 grows with x.
     assert_eq!(on_surface[0]["stable"], false);
     assert_eq!(on_surface[0]["admissible"], true);
+}
+
+#[test]
+fn equilibria_on_a_kink_are_those_of_both_sides() {
+    let request = r#"{"kind": "portrait", "box": [-2, 2, -2, 2]}"#;
+    let reply = ask(&quadratic_drag(), request);
+    let found = reply.header["equilibria"].as_array().unwrap();
+    let mut known: Vec<_> = found
+        .iter()
+        .map(|e| (e["y"][0].as_f64().unwrap(), &e["stable"], &e["admissible"]))
+        .collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert_eq!(known.len(), 3, "{found:?}");
+    for ((x, stable, admissible), expected) in known.into_iter().zip([-1.0, 0.0, 1.0]) {
+        assert!((x - expected).abs() < 1e-9);
+        // Linear terms do not decide about the centres.
+        let decided = serde_json::json!((expected == 0.0).then_some(false));
+        assert_eq!((stable, admissible), (&decided, &serde_json::json!(true)));
+    }
 }
 
 #[test]
