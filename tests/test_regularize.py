@@ -75,6 +75,47 @@ def test_kinks_become_smooth() -> None:
     np.testing.assert_allclose(at(smooth, [x, y]), [x * first - larger, -y], rtol=1e-14)
 
 
+def _smooth_abs(v: float) -> float:
+    return float(v * np.tanh(v / 0.1))
+
+
+@pytest.mark.parametrize(
+    ("force", "expected"),
+    [
+        (lambda v: np.exp(-np.abs(v) / 0.05), lambda v: np.exp(-_smooth_abs(v) / 0.05)),
+        (lambda v: np.sqrt(2 * np.abs(v)), lambda v: np.sqrt(2 * _smooth_abs(v))),
+        (lambda v: np.sign(v) * np.sqrt(np.abs(v)), lambda v: np.tanh(v / 0.1) * np.sqrt(_smooth_abs(v))),
+        (lambda v: 1 / (1 + np.maximum(v, -v)), lambda v: 1 / (1 + _smooth_abs(v))),
+        (lambda v: np.cos(np.where(v > 0, 3 * v, -v)), lambda v: np.cos(v + 2 * _smooth_abs(v))),
+        (
+            lambda v: np.sign(v) * (1 + 2 * np.exp(-np.abs(v) / 0.02)),
+            lambda v: np.tanh(v / 0.1) * (1 + 2 * np.exp(-_smooth_abs(v) / 0.02)),
+        ),
+        # A jump inside of a function stays the mean of both sides.
+        (
+            lambda v: np.exp(np.sign(v) + np.abs(v)),
+            lambda v: np.exp(_smooth_abs(v)) * (np.cosh(1) + np.tanh(v / 0.1) * np.sinh(1)),
+        ),
+    ],
+)
+def test_kinks_inside_of_functions_are_smooth_there(force: Any, expected: Any) -> None:
+    smooth = fl.System(lambda t, x: [force(x[0])], n=1).regularize(0.1)
+    for v in (0.3, 0.02, 0.0, -0.004, -0.5):
+        assert at(smooth, [v])[0] == pytest.approx(float(expected(v)), rel=1e-13, abs=1e-300)
+
+
+def test_stribeck_friction_with_a_width_above_its_velocity() -> None:
+    """The mean of exp(-v / vs) and exp(v / vs) would be far above the force of any side."""
+
+    def belt(t: Any, x: Any, vs: float = 0.05) -> Any:
+        force = 0.05 + 0.05 * np.exp(-np.abs(x[0]) / vs)
+        return [-np.sign(x[0]) * force]
+
+    smooth = fl.System(belt, n=1).regularize(0.2)
+    for v in np.linspace(-1, 1, 41):
+        assert abs(at(smooth, [v])[0]) <= 0.1
+
+
 def test_the_width_is_a_parameter() -> None:
     system = fl.System(lambda t, x, a=0.5: [a - np.sign(x[0])], n=1)
     smooth = system.regularize(1e-2, kappa=2.0)

@@ -416,11 +416,12 @@ class System(Points, Saving):
 
         Notes
         -----
-        Every spelling of a switch means a sign: ``abs(h)`` becomes ``h tanh(u)``, and a choice between two
-        values, and any other function of a sign, the mean of the two with the weights ``(1 + tanh(u)) / 2``
-        and ``(1 - tanh(u)) / 2``. So its limit is Filippov's motion, whatever the spelling. Both values are
-        needed on both sides of the surface. Motions that slide are stiff, with rates like 1 / eps: for small
-        `eps` take ``method="Rodas5P"``.
+        Every spelling of a switch means a sign. A choice between two values, and any function of a sign,
+        becomes the mean of the two with the weights ``(1 + tanh(u)) / 2`` and ``(1 - tanh(u)) / 2``. A kink,
+        where both values are the same at h = 0, is smooth by itself: ``abs(h)`` is ``h tanh(u)``, also inside
+        of other functions, as in ``exp(-abs(h))``. So its limit is Filippov's motion, whatever the spelling.
+        Both values are needed on both sides of the surface. Motions that slide are stiff, with rates like
+        1 / eps: for small `eps` take ``method="Rodas5P"``.
 
         References
         ----------

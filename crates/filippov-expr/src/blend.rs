@@ -354,15 +354,20 @@ impl<'g> Blender<'g> {
 }
 
 impl Graph {
-    /// The value that goes from `below` at s = -1 to `above` at s = 1; neither contains s. The weights make it
-    /// exact at both ends.
+    /// The value that goes from `below` at s = -1 to `above` at s = 1; neither contains s.
     fn mixed(&mut self, surface: u32, above: NodeId, below: NodeId) -> NodeId {
         let simplified = self.select(surface, 1.0, above, below);
         match *self.node(simplified) {
             Node::Select { surface: j, .. } if j == surface => {}
             _ => return simplified,
         }
-        let (sign, half) = (self.sign_of(surface), self.constant(0.5));
+        let sign = self.sign_of(surface);
+        self.weighted(sign, above, below)
+    }
+
+    /// `below` at the sign -1, `above` at +1, and on the straight line between them; exact at both ends.
+    pub(crate) fn weighted(&mut self, sign: NodeId, above: NodeId, below: NodeId) -> NodeId {
+        let half = self.constant(0.5);
         let half_sign = self.mul(half, sign);
         let (weight_above, weight_below) = (self.add(half_sign, half), self.sub(half, half_sign));
         let (above, below) = (self.mul(above, weight_above), self.mul(below, weight_below));

@@ -3,8 +3,10 @@
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
+use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
-use crate::op::UnaryOp;
+use crate::op::{BinaryOp, UnaryOp};
+use crate::region::Regions;
 use crate::switching::Switching;
 
 /// The function that takes the place of a sign.
@@ -19,7 +21,7 @@ pub enum Ramp {
 impl Graph {
     /// A new graph with these values in which the sign of every surface j is a function of `kappa[j] * h_j / eps`. In between
     /// the values are those of the multilinear interpolant, however they were written (see [`Graph::blended`]); `None` if they
-    /// have none that can be written out.
+    /// have none that can be written out. A kink, as |h_j|, is smooth by itself, and what contains it is a function of that.
     ///
     /// `eps` is the parameter with this index. Only a linear ramp leaves surfaces, where it bends.
     ///
@@ -42,9 +44,11 @@ impl Graph {
     ) -> Option<(Graph, Vec<NodeId>)> {
         let all: Vec<u32> = (0..self.n_surfaces() as u32).collect();
         let mut own = self.clone();
-        let roots = own.blended(roots, &all)?;
-        let functions: Vec<NodeId> = all.iter().map(|&j| own.surface(j)).collect();
-        let functions = own.blended(&functions, &all)?;
+        let functions = all.iter().map(|&j| own.surface(j));
+        let values: Vec<NodeId> = roots.iter().copied().chain(functions).collect();
+        let values = own.with_smooth_kinks(&values);
+        let values = own.blended(&values, &all)?;
+        let (roots, functions) = values.split_at(roots.len());
         let mut graph = Graph::new();
         let eps = graph.parameter(eps);
         let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
@@ -53,7 +57,11 @@ impl Graph {
         let mut pending = roots.to_vec();
         while let Some(&id) = pending.last() {
             let node = *own.node(id);
-            let function = node.surface().map(|j| functions[j as usize]);
+            let surface = match node {
+                Node::Input(j) => Some(j),
+                _ => node.surface(),
+            };
+            let function = surface.map(|j| functions[j as usize]);
             let missing: Vec<NodeId> = node
                 .operands()
                 .chain(function)
@@ -64,7 +72,7 @@ impl Graph {
                 continue;
             }
             pending.pop();
-            let sign = node.surface().map(|j| {
+            let sign = surface.map(|j| {
                 *signs.entry(j).or_insert_with(|| {
                     let factor = graph.constant(kappa[j as usize]);
                     let scaled = graph.mul(factor, image[&functions[j as usize]]);
@@ -82,6 +90,55 @@ impl Graph {
         }
         let values = roots.iter().map(|root| image[root]).collect();
         Some((graph, values))
+    }
+
+    /// The values in which input j takes the place of the sign of surface j at its kinks: in products of the sign with what
+    /// vanishes at h_j = 0, and in choices between two values that are the same there.
+    fn with_smooth_kinks(&mut self, roots: &[NodeId]) -> Vec<NodeId> {
+        let mut regions = Regions::new(self.clone(), Vec::new(), Vec::new());
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in self.all_below(roots) {
+            let of = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let node = *self.node(id);
+            let new = match (node, self.signed_product(&node)) {
+                (_, Some((j, factor, other))) if regions.is_zero_on(other, j) => {
+                    let (sign, factor) = (self.input(j), self.constant(factor));
+                    let scaled = self.mul(factor, sign);
+                    self.mul(scaled, of(other))
+                }
+                (
+                    Node::Select {
+                        surface,
+                        plus,
+                        minus,
+                    },
+                    _,
+                ) if regions.is_same_on(plus, minus, surface) => {
+                    let sign = self.input(surface);
+                    self.weighted(sign, of(plus), of(minus))
+                }
+                _ => self.with_operands(id, of),
+            };
+            image.insert(id, new);
+        }
+        roots.iter().map(|root| image[root]).collect()
+    }
+
+    /// The surface, the factor of its sign, and the other operand, of a product with a multiple of a sign.
+    fn signed_product(&self, node: &Node) -> Option<(u32, f64, NodeId)> {
+        let Node::Binary(BinaryOp::Mul, a, b) = *node else {
+            return None;
+        };
+        [(a, b), (b, a)].into_iter().find_map(|(a, b)| {
+            let form = LinearForm::of(self, a);
+            match form.terms[..] {
+                [(atom, factor)] if form.constant == 0.0 => match *self.node(atom) {
+                    Node::Sign(j) => Some((j, factor, b)),
+                    _ => None,
+                },
+                _ => None,
+            }
+        })
     }
 
     fn ramp(&mut self, u: NodeId, ramp: Ramp) -> NodeId {

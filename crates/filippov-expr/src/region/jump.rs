@@ -81,6 +81,18 @@ impl Regions {
         false
     }
 
+    /// Whether a value is seen to be zero where the function of a surface is.
+    pub(crate) fn is_zero_on(&mut self, value: NodeId, surface: u32) -> bool {
+        let function = self.graph.surface(surface);
+        self.vanishes_with(value, function)
+    }
+
+    /// Whether two values are seen to be the same where the function of a surface is zero.
+    pub(crate) fn is_same_on(&mut self, one: NodeId, other: NodeId, surface: u32) -> bool {
+        let difference = self.graph.sub(one, other);
+        self.is_zero_on(difference, surface)
+    }
+
     /// Whether a value is zero wherever a function is.
     pub(super) fn vanishes_with(&mut self, value: NodeId, function: NodeId) -> bool {
         let form = LinearForm::of(&self.graph, value);
