@@ -12,7 +12,7 @@ use crate::motion::{first_nonzero, Leading, TwoFold};
 use crate::motion::{Guard, MeetingFields, RootEnd, Tie};
 use crate::system::dot;
 use crate::system::eval_on_side;
-use crate::tolerances::{AT_SIDE, DOUBTFUL};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, TANGENT};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -122,10 +122,7 @@ impl Candidate<'_> {
         let is_silent = silent_rows((self.fields, self.noise), self.entries.entries());
         if self.entries.sliding_set().any(|i| is_silent[i]) {
             return match self.entries.sliding() {
-                Some(place) => Ok(match self.at_two_fold(at, place)? {
-                    Verdict::Open(_) => Verdict::Untold,
-                    verdict => verdict,
-                }),
+                Some(place) => self.at_two_fold(at, notes, place),
                 None => self.blown_up(at, notes, &is_silent),
             };
         }
@@ -328,16 +325,28 @@ impl Candidate<'_> {
     }
 
     /// Sliding on one surface to which both fields are tangent.
-    fn at_two_fold(&self, at: &Point, place: usize) -> Result<Verdict, FieldError> {
+    fn at_two_fold(
+        &self,
+        at: &Point,
+        notes: &mut Notes,
+        place: usize,
+    ) -> Result<Verdict, FieldError> {
         let slid = self.meeting.surfaces[place];
         let signs = self.mode.signs();
         let mut two_fold = TwoFold::new(at.system, slid, 1, at.place(&signs));
         if matches!(self.meeting.how, How::Event(_)) {
             two_fold = two_fold.located();
         }
+        if !two_fold.is_regular()? {
+            // Where both fields are the same there is one motion, whatever the multiplier, and a trial tells.
+            return Ok(match self.is_same_on_sides(at, notes, slid)? {
+                true => Verdict::Open(self.outset(&[]).viable.next),
+                false => Verdict::Untold,
+            });
+        }
         let [minus, plus] = Guard::ends(slid);
         let motions = two_fold.motions()?.into_iter();
-        self.first_viable(motions.map(|motion| {
+        let verdict = self.first_viable(motions.map(|motion| {
             let mut outset = self.outset(&[motion.multiplier()]);
             outset.add(minus, 1, Germ::of(motion.minus, Germ::Unknown));
             outset.add(plus, -1, Germ::of(motion.plus, Germ::Unknown));
@@ -348,7 +357,25 @@ impl Candidate<'_> {
             let start = outset.viable.next.start_mut();
             (start.is_given, start.two_fold) = (true, Some(motion));
             Ok(outset)
-        }))
+        }))?;
+        // A trial knows no multiplier either.
+        Ok(match verdict {
+            Verdict::Open(_) => Verdict::Untold,
+            verdict => verdict,
+        })
+    }
+
+    /// Are the fields on both sides of a surface the same here?
+    fn is_same_on_sides(
+        &self,
+        at: &Point,
+        notes: &mut Notes,
+        j: usize,
+    ) -> Result<bool, FieldError> {
+        let [minus, plus] = [-1, 1].map(|side| at.velocity(notes, &self.mode.with(j, side), &[]));
+        let (minus, plus) = (minus?, plus?);
+        let mut pairs = minus.iter().zip(&plus).enumerate();
+        Ok(pairs.all(|(i, (a, b))| (a - b).abs() <= TANGENT * self.pace * at.size(i)))
     }
 
     /// Sliding on several surfaces where equations of the multipliers vanish.

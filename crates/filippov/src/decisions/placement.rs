@@ -171,20 +171,20 @@ fn slipped_through(
     Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
 }
 
-/// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
+/// Do the actions at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
 pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
-    let Some((action, _)) = at.actions.at_surface(j) else {
-        return Ok(false);
-    };
+    let actions = at.actions.from_side(j, if signs[j] < 0.0 { -1 } else { 1 });
     let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
-    action.map.apply(at.t, &mut moved, signs, &mut q)?;
+    for action in &actions {
+        action.map.apply(at.t, &mut moved, signs, &mut q)?;
+    }
     let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
     at.system
         .surfaces(&at.place_at(at.t, at.x, signs), &mut h[0])?;
     at.system
         .surfaces(&at.place_at(at.t, &moved, signs), &mut h[1])?;
     let size = at.system.surface_size(j, &at.place(signs))?;
-    Ok((h[0][j] - h[1][j]).abs() <= ROUNDING * size)
+    Ok(!actions.is_empty() && (h[0][j] - h[1][j]).abs() <= ROUNDING * size)
 }
 
 /// The point moved back onto the triggers that it slipped through, if there are any.
@@ -355,15 +355,15 @@ enum Touching {
 
 fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError> {
     let side = mode.entries()[j];
-    let Some(action) = at.actions.from_side(j, side) else {
+    let impact = Impact::new(at, j, mode)?;
+    let Some(first) = impact.actions.first() else {
         return Ok(Touching::NoContact);
     };
-    let impact = Impact::new(at, action, j, mode)?;
-    let (moved, q) = impact.applied(at.x)?;
+    let moved = impact.applied(at.x)?;
     let size = dot(at.x, at.x).sqrt();
     let shift: Vec<f64> = moved.iter().zip(at.x).map(|(m, x)| m - x).collect();
     let moves = dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size);
-    if q != at.q || (moves && !leaves_point_alone(at, j, &mode.signs())?) {
+    if moves && !leaves_point_alone(at, j, &mode.signs())? {
         return Ok(Touching::NoContact);
     }
     let usual = impact.impulse(at.x)?;
@@ -372,7 +372,7 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
             <= FRICTION_IN_MAP * (dot(&shift, &shift) * dot(&impact.normal, &impact.normal)).sqrt();
         return Ok(
             match leaves_speed && impact.changes_normal_velocity(&usual) {
-                true => Touching::WithFriction(action.name.clone()),
+                true => Touching::WithFriction(first.name.clone()),
                 false => Touching::NoContact,
             },
         );
@@ -389,15 +389,15 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
         return Ok(Touching::NoContact);
     }
     Ok(match impact.depends_on_tangential_velocity(at.x, &usual)? {
-        true => Touching::WithFriction(action.name.clone()),
+        true => Touching::WithFriction(first.name.clone()),
         false => Touching::Stays,
     })
 }
 
-/// The map of an action at a surface that is touched without velocity, as an impact.
+/// The actions at a surface that is touched without velocity, as an impact.
 struct Impact<'p, 'm, 'a> {
     at: &'p Point<'p, 'm, 'a>,
-    action: &'p Action<'a>,
+    actions: SmallVec<[&'p Action<'p>; 1]>,
     signs: Signs,
     /// The gradient of h_j' by the state: the direction of the normal velocity.
     normal: Vec<f64>,
@@ -408,12 +408,7 @@ struct Impact<'p, 'm, 'a> {
 }
 
 impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
-    fn new(
-        at: &'p Point<'p, 'm, 'a>,
-        action: &'p Action<'a>,
-        j: usize,
-        mode: &Mode,
-    ) -> Result<Self, FieldError> {
+    fn new(at: &'p Point<'p, 'm, 'a>, j: usize, mode: &Mode) -> Result<Self, FieldError> {
         let signs = mode.signs();
         let mut normal = vec![0.0; at.x.len()];
         at.system.rate_gradient(j, &at.place(&signs), &mut normal)?;
@@ -422,7 +417,7 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         let approach = -f64::from(mode.entries()[j]) * MOMENT * slow / size;
         Ok(Impact {
             at,
-            action,
+            actions: at.actions.from_side(j, mode.entries()[j]),
             signs,
             normal,
             slow,
@@ -430,20 +425,22 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         })
     }
 
-    /// The state after the action.
-    fn applied(&self, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), FieldError> {
+    /// The state after the actions.
+    fn applied(&self, x: &[f64]) -> Result<Vec<f64>, FieldError> {
         let (mut moved, mut q) = (x.to_vec(), self.at.q.to_vec());
-        self.action
-            .map
-            .apply(self.at.t, &mut moved, &self.signs, &mut q)?;
-        Ok((moved, q))
+        for action in &self.actions {
+            action
+                .map
+                .apply(self.at.t, &mut moved, &self.signs, &mut q)?;
+        }
+        Ok(moved)
     }
 
     /// What an approach at these velocities adds to the change of the state, per normal velocity.
     fn impulse(&self, x: &[f64]) -> Result<Vec<f64>, FieldError> {
         let pairs = x.iter().zip(&self.normal);
         let hits: Vec<f64> = pairs.map(|(x, n)| x + self.approach * n).collect();
-        let (stays, after) = (self.applied(x)?.0, self.applied(&hits)?.0);
+        let (stays, after) = (self.applied(x)?, self.applied(&hits)?);
         let change = |i: usize| ((after[i] - hits[i]) - (stays[i] - x[i])) / self.approach;
         Ok((0..x.len()).map(change).collect())
     }

@@ -37,11 +37,10 @@ pub(crate) fn warn_against_direction(
 /// Would the action at surface `j`, on which the point lies, leave the motion on the side of the mode?
 fn would_turn_back(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
     let (side, signs) = (mode.entries()[j], mode.signs());
-    let Some(action) = at.actions.from_side(j, side) else {
-        return Ok(false);
-    };
     let (mut x, mut q) = (at.x.to_vec(), at.q.to_vec());
-    action.map.apply(at.t, &mut x, &signs, &mut q)?;
+    for action in at.actions.from_side(j, side) {
+        action.map.apply(at.t, &mut x, &signs, &mut q)?;
+    }
     let mut h = vec![0.0; signs.len()];
     at.system.surfaces(&at.place_at(at.t, &x, &signs), &mut h)?;
     if !leaves_point_alone(at, j, &signs)? {

@@ -40,8 +40,12 @@ impl Surroundings {
         let mut noise = Vec::with_capacity(surfaces.len());
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            for side in [-1, 1] {
-                let signs = mode.with(j, side).signs();
+            // Their components bend with the signs that multiply theirs.
+            let own = [j];
+            let group = groups.iter().find(|group| group.contains(&j));
+            let group = group.map_or(&own[..], |group| group);
+            for pattern in 0..1_usize << group.len() {
+                let signs = mode.on_sides(group, pattern).signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;

@@ -184,12 +184,15 @@ impl<'a> ContactField<'a> {
     fn impulses(&self, t: f64, x: &[f64], rows: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, FieldError> {
         let mut impulses = Vec::with_capacity(rows.len());
         for (&(j, side), row) in self.contacts.iter().zip(rows) {
-            let mut w = vec![0.0; x.len()];
-            if let Some(action) = self.actions.from_side(j, if side < 0.0 { -1 } else { 1 }) {
-                let map = action.map;
+            // A body approaches: the map may have a kink at zero speed.
+            let approach: Vec<f64> = row.iter().map(|r| -side * r).collect();
+            let (mut moved, mut change) = (approach.clone(), vec![0.0; x.len()]);
+            for action in self.actions.from_side(j, if side < 0.0 { -1 } else { 1 }) {
                 let Setting { signs, q } = self.setting.get();
-                map.impulse(t, x, row, signs, q, &mut w)?;
+                action.map.impulse(t, x, &moved, signs, q, &mut change)?;
+                moved.iter_mut().zip(&change).for_each(|(m, c)| *m += c);
             }
+            let mut w: Vec<f64> = moved.iter().zip(&approach).map(|(m, a)| m - a).collect();
             let strength = dot(row, &w);
             let size = (dot(row, row) * dot(&w, &w)).sqrt();
             let scale = if strength.abs() > DOUBTFUL * size {

@@ -144,6 +144,16 @@ impl<'s> TwoFold<'s> {
         Ok(if is_clear { mean.value } else { 0.0 })
     }
 
+    /// Are the first derivatives of h finite that do not vanish? Those of (h_k)^1.5 on h_k = 0 are not.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn is_regular(&mut self) -> Result<bool, FieldError> {
+        let first = self.first_length()?;
+        let words = first.map_or(&[][..], |length| &self.own.values[length]);
+        Ok(words.iter().all(|lie| lie.value.is_finite()))
+    }
+
     /// All sliding motions from here.
     ///
     /// # Errors

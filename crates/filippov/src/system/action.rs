@@ -5,6 +5,8 @@
 //! clock) and a map (t, x, s, q) -> (x+, q+). Impacts, impulses, sampled controllers, relays with hysteresis and
 //! quantisers are all made of these.
 
+use smallvec::SmallVec;
+
 use super::Clock;
 use crate::error::FieldError;
 use crate::switch::Kind;
@@ -66,8 +68,8 @@ pub trait ActionMap: Sync {
     /// Brings discrete states that are functions of the point up to date, which were not watched; nothing by default.
     fn follow(&self, _t: f64, _x: &[f64], _signs: &[f64], _q: &mut [f64]) {}
 
-    /// Writes the derivative of x+ - x in the direction `along`: the direction of the impulse, where the map
-    /// leaves x alone at zero speed. By differences unless overridden.
+    /// Writes the derivative of x+ - x in the direction `along`, on the side of kinks to which that leads: the direction of the
+    /// impulse, where the map leaves x alone at zero speed. By differences unless overridden.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -91,7 +93,7 @@ impl<F: Fn(f64, &mut [f64], &mut [f64]) + Sync> ActionMap for F {
     }
 }
 
-/// The change of x by the map, at one point and at another beside it. Maps that are linear in the velocity, as
+/// The change of x by the map, at a point and at two beside it, on one side. Maps that are linear in the velocity, as
 /// almost all are, have no error but rounding, however long the way between the points.
 fn impulse_by_differences<M: ActionMap + ?Sized>(
     map: &M,
@@ -110,9 +112,9 @@ fn impulse_by_differences<M: ActionMap + ?Sized>(
         map.apply(t, &mut end, signs, &mut q)?;
         Ok(end.iter().zip(&start).map(|(e, s)| e - s).collect())
     };
-    let (above, below) = (change(d)?, change(-d)?);
-    for ((out, a), b) in impulse.iter_mut().zip(&above).zip(&below) {
-        *out = (a - b) / (2.0 * d);
+    let (here, near, far) = (change(0.0)?, change(d)?, change(2.0 * d)?);
+    for (i, out) in impulse.iter_mut().enumerate() {
+        *out = (4.0 * (near[i] - here[i]) - (far[i] - here[i])) / (2.0 * d);
     }
     Ok(())
 }
@@ -184,13 +186,19 @@ impl Actions<'_> {
         }
     }
 
-    /// The first action that surface `j` triggers for a motion from `side`; if there is none, the first of all.
-    pub fn from_side(&self, j: usize, side: i8) -> Option<&Action<'_>> {
+    /// The actions that surface `j` triggers for a motion from `side`, in order; if there are none, the first of all.
+    pub fn from_side(&self, j: usize, side: i8) -> SmallVec<[&Action<'_>; 1]> {
         let meant = |(_, direction, _): &(_, i8, _)| *direction == 0 || *direction == -side;
-        let found = self.all_at_surface(j).find(meant);
-        found
-            .or_else(|| self.all_at_surface(j).next())
-            .map(|(action, ..)| action)
+        let found = self.all_at_surface(j).filter(meant);
+        let found: SmallVec<_> = found.map(|(action, ..)| action).collect();
+        match found.is_empty() {
+            true => self
+                .at_surface(j)
+                .map(|(first, _)| first)
+                .into_iter()
+                .collect(),
+            false => found,
+        }
     }
 
     /// The actions, by their place in the list, that surface `j` triggers for a motion that comes from `side`.

@@ -6,7 +6,8 @@ use filippov_expr::{Backend, NodeId, Program};
 
 use super::{PiecewiseSystem, Place, Setting, TracedSystem};
 use crate::error::FieldError;
-use crate::system::ActionMap;
+use crate::system::{dot, ActionMap};
+use crate::tolerances::MOMENT;
 
 /// A map x -> x+ given by expressions in (t, x, p): those of the field of a [`TracedSystem`]. Switching functions in
 /// them are evaluated at the state before. If there are more expressions than states, the others are those of the
@@ -101,10 +102,13 @@ impl ActionMap for TracedMap {
             return Ok(());
         };
         let before = self.with_named(x, q);
-        let signs = sides_of(&self.expressions, (t, &before), &[])?;
-        let (mut direction, mut change) = (before.clone(), before.clone());
-        direction.fill(0.0);
+        let (mut direction, mut change) = (vec![0.0; before.len()], before.clone());
         direction[..x.len()].copy_from_slice(along);
+        let norm = dot(along, along).sqrt().max(f64::MIN_POSITIVE);
+        let way = MOMENT * MOMENT * (1.0 + dot(x, x).sqrt()) / norm;
+        let beside = before.iter().zip(&direction).map(|(x, d)| x + way * d);
+        let beside: Vec<f64> = beside.collect();
+        let signs = sides_of(&self.expressions, (t, &beside), &[])?;
         let place = Place::new(t, &before, &signs);
         self.expressions
             .eval(program, &place, &direction, &mut change);
