@@ -85,3 +85,64 @@ def test_a_body_is_released_however_long_the_run(load: float, end: float, method
         turns = np.ceil((start - released) / (2 * np.pi) - 1e-9)
         expected = released + 2 * np.pi * max(turns, 0)
         assert abs(last - min(expected, end)) < 1e-6
+
+
+COUNTS = {"n + 1": lambda t, x, n: n + 1, "1 - n": lambda t, x, n: 1 - n}
+
+
+@pytest.mark.parametrize("direction", ["down", "both"])
+@pytest.mark.parametrize("count", list(COUNTS))
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_ball_that_counts_its_impacts_comes_to_rest(e: float, count: str, direction: str) -> None:
+    """What the impact would do to a discrete state at rest is no reason to fall through the floor."""
+    hit = fl.Reset(
+        lambda t, x: x[0], lambda t, x: [x[0], -e * x[1]], set={"n": COUNTS[count]}, direction=direction
+    )
+    ball = fl.System(lambda t, x, n: [x[1], -9.8], n=2, discrete={"n": 0}, resets=hit)
+    # Without a direction the side of a start on the floor is not known.
+    starts = [[0.3, 0.0]] if direction == "both" else [[0.3, 0.0], [0.0, 0.0]]
+    for y0 in starts:
+        sol = ball.solve((0, 3), y0)
+        assert sol.success
+        np.testing.assert_allclose(sol.y[:, -1], 0.0, atol=1e-12)
+        assert str(sol.mode_at(3.0)) == "0"
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_counter_beside_the_bounce_in_any_order(order: int) -> None:
+    bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.5 * x[1]], direction="down")
+    counter = fl.Reset(lambda t, x: x[0], set={"n": lambda t, x, n: n + 1}, direction="down")
+    ball = fl.System(lambda t, x, n: [x[1], -9.8], n=2, discrete={"n": 0}, resets=[bounce, counter][::order])
+    sol = ball.solve((0, 3), [0.3, 0.0])
+    assert sol.success
+    np.testing.assert_allclose(sol.y[:, -1], 0.0, atol=1e-12)
+
+
+def test_a_counter_at_a_section_is_passed() -> None:
+    section = fl.Reset(lambda t, x: x[0], set={"n": lambda t, x, n: n + 1}, direction="down")
+    swing = fl.System(lambda t, x, n: [x[1], -x[0]], n=2, discrete={"n": 0}, resets=section)
+    sol = swing.solve((0, 20), [1.0, 0.0])
+    assert sol.discrete["n"][-1] == 3
+    assert sol.y[0, -1] == pytest.approx(np.cos(20.0), abs=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore:untraced")
+@pytest.mark.parametrize("traced", [True, False])
+@pytest.mark.parametrize(
+    "gain", [lambda v: -v, np.abs, lambda v: np.maximum(-v, 0.0), lambda v: np.sqrt(v**2)]
+)
+@pytest.mark.parametrize("bounce", [lambda v: -0.5 * v, lambda v: 0.5 * np.abs(v)])
+def test_the_side_of_a_kink_of_the_map_is_that_of_the_approach(bounce: Any, gain: Any, traced: bool) -> None:
+    """The impulse of contact goes on with what impacts add: g / (1 + e) in each unit of time."""
+
+    def hit(t: Any, x: Any) -> Any:
+        if not traced:
+            x = [float(v) for v in x]
+        return [x[0], bounce(x[1]), x[2] + gain(x[1])]
+
+    reset = fl.Reset(lambda t, x: x[0], hit, direction="down")
+    sol = fl.solve_ivp(lambda t, x: [x[1], -9.8, 0.0], (0, 2.9), [0.3, 0.0, 0.0], resets=reset)
+    first, speed = np.sqrt(2 * 0.3 / 9.8), np.sqrt(2 * 0.3 * 9.8)
+    rest = first * 3.0
+    expected = speed / 0.5 + 9.8 / 1.5 * (2.9 - rest)
+    assert sol.y[2, -1] == pytest.approx(expected, abs=2e-5)

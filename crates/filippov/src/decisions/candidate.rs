@@ -8,7 +8,7 @@ use super::rule::{How, Meeting};
 use crate::cube::{is_undetermined, stable_roots_with_border, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{first_nonzero, Leading, TwoFold};
+use crate::motion::{first_nonzero, first_nonzero_inside, Leading, TwoFold};
 use crate::motion::{Guard, MeetingFields, RootEnd, Tie};
 use crate::system::dot;
 use crate::system::eval_on_side;
@@ -228,7 +228,11 @@ impl Candidate<'_> {
                 None => Germ::Unknown,
             };
             if lambda.is_empty() && germ == Germ::Unknown {
-                let leading = first_nonzero(at.system, j, side, 1, &at.place(&mode.signs()))?;
+                let signs = mode.signs();
+                let leading = match series {
+                    Some(_) => first_nonzero_inside(at.system, j, side, &at.place(&signs))?,
+                    None => first_nonzero(at.system, j, side, 1, &at.place(&signs))?,
+                };
                 germ = Germ::of(leading, Germ::Zero);
             }
             if germ != Germ::Zero {

@@ -10,7 +10,7 @@ use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::powers::power;
 use crate::system::{dot, AffineParts, MotionJets};
-use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
+use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, ROUNDING, VANISHING_GERM};
 
 /// How a guard begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub(super) enum Germ {
     Begins(Leading),
     /// All derivatives up to the highest order vanish.
     Zero,
-    /// A derivative does not exist at the point.
+    /// A derivative does not exist at the point, or within rounding of it.
     Unknown,
 }
 
@@ -43,6 +43,8 @@ pub(super) struct MotionSeries {
     rates: Vec<f64>,
     sizes: Vec<f64>,
     pace: f64,
+    /// The time in which the motion passes what rounding makes of the place.
+    rounding_of_time: f64,
 }
 
 impl MotionSeries {
@@ -66,8 +68,10 @@ impl MotionSeries {
             let rates = orders.map(|k| power(of(i, k), 1.0 / k as f64));
             rates.filter(|rate| rate.is_finite()).fold(speed, f64::max)
         };
-        let rates = (0..n).map(rate).collect();
+        let rates: Vec<f64> = (0..n).map(rate).collect();
+        let across = if speed > 0.0 { 1.0 / speed } else { 0.0 };
         Some(MotionSeries {
+            rounding_of_time: ROUNDING * (at.t.abs() + across),
             pace,
             jets,
             signs,
@@ -126,12 +130,26 @@ impl MotionSeries {
         })
     }
 
+    /// Does a series with these coefficients converge within rounding of the place only? So it is with powers of a distance that is
+    /// zero, such as 1.5, in which rounding has left something.
+    fn ends_within_rounding(&self, coefficient: impl Fn(usize) -> f64) -> bool {
+        let last = self.jets.order();
+        let growth = |m: usize| {
+            let ratio = coefficient(last).abs() / coefficient(last - m).abs();
+            power(ratio, 1.0 / m as f64)
+        };
+        (1..last.min(5)).all(|m| growth(m) * self.rounding_of_time > 1.0)
+    }
+
     fn first(
         &self,
         from: usize,
         coefficient: impl Fn(usize) -> f64,
         size: impl Fn(usize) -> f64,
     ) -> Germ {
+        if self.ends_within_rounding(&coefficient) {
+            return Germ::Unknown;
+        }
         let mut factorial = 1.0;
         for k in 0..=self.jets.order() {
             factorial *= k.max(1) as f64;

@@ -104,7 +104,7 @@ pub(super) fn decide_undecided(
         }
     }
     let decided = by_viable_modes(at, notes, meeting, reason)?;
-    if let Err(Stop::Intersection { .. }) = decided {
+    if matches!(decided, Err(Stop::Intersection { .. })) && !at.patience.is_over() {
         if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
             notes.leaf = "rest";
             return Ok(Ok(stays));

@@ -40,12 +40,14 @@ impl Surroundings {
         let mut noise = Vec::with_capacity(surfaces.len());
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            // Their components bend with the signs that multiply theirs.
-            let own = [j];
+            // Also beyond each of the surfaces whose signs multiply its own: a force that begins there.
             let group = groups.iter().find(|group| group.contains(&j));
-            let group = group.map_or(&own[..], |group| group);
-            for pattern in 0..1_usize << group.len() {
-                let signs = mode.on_sides(group, pattern).signs();
+            let others = group.into_iter().flatten().filter(|&&k| k != j);
+            let beyond = others.map(|&k| mode.with(k, -mode.entries()[k]));
+            let modes = std::iter::once(mode.clone()).chain(beyond);
+            let sides = modes.flat_map(|mode| [-1, 1].map(|side| mode.with(j, side)));
+            for mode in sides.take_while(|_| !at.patience.is_over()) {
+                let signs = mode.signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;
