@@ -350,3 +350,30 @@ def test_second_derivatives_of_times() -> None:
     ticks = fl.System(lambda t, x, p: [np.floor(t / p**2)], n=1, params={"p": 0.5})
     sol = ticks.solve((0, 0.8), [0.0], wrt=["p"], order=2, **TIGHT)
     assert [float(one.derivative.second_dt[0, 0]) for one in sol.switches] == pytest.approx([2, 4, 6])
+
+
+@pytest.mark.parametrize(
+    ("A", "w", "e", "end"), [(0.02, 30.0, 0.3, 0.85), (0.02, 5.0, 0.5, 1.4), (0.02, 5.0, 0.0, 1.2)]
+)
+def test_in_contact_with_a_table_that_moves(A: float, w: float, e: float, end: float) -> None:
+    """There x = A sin(w t), also behind infinitely many impacts, or one without rebound."""
+    table = fl.System(
+        lambda t, x, g, A, w, e: [x[1], -g],
+        n=2,
+        params={"g": 9.8, "A": A, "w": w, "e": e},
+        resets=fl.Reset(
+            lambda t, x, A, w: x[0] - A * np.sin(w * t),
+            lambda t, x, A, w, e: [x[0], -e * x[1] + (1 + e) * A * w * np.cos(w * t)],
+            direction="down",
+        ),
+    )
+    sol = table.solve((0, end), [0.3, 0.0], wrt="all", order=2)
+    assert str(sol.mode_at(end)) == "0"
+    for t in (end, end - 1e-3):
+        s, c = np.sin(w * t), np.cos(w * t)
+        expected = np.zeros((2, 6, 6))
+        expected[0, 3, 4] = expected[0, 4, 3] = t * c
+        expected[0, 4, 4] = -A * t**2 * s
+        expected[1, 3, 4] = expected[1, 4, 3] = c - w * t * s
+        expected[1, 4, 4] = -2 * A * t * s - A * w * t**2 * c
+        np.testing.assert_allclose(sol.derivative(t, order=2), expected, atol=1e-12)

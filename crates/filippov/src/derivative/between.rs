@@ -108,6 +108,9 @@ impl<'r> Differentiated<'r> {
             pairs: known.chunks_exact(n).map(<[f64]>::to_vec).collect(),
         };
         let path = self.path(t, side);
+        let Some(there) = self.columns(t, side)? else {
+            return Ok(None);
+        };
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
@@ -115,6 +118,9 @@ impl<'r> Differentiated<'r> {
         if !piece.advance_pairs(path, span, &columns, &mut second)? {
             return Ok(Some(vec![f64::NAN; size]));
         }
+        let mut x = vec![0.0; n];
+        path(t, &mut x)?;
+        second.hold(piece, (t, &piece.extended.state(&x)), &there)?;
         Ok(Some(second.pairs.concat()))
     }
 

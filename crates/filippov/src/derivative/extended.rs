@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use filippov_expr::{Backend, ExprError, Names, NodeId, Program};
+use filippov_expr::{Backend, ExprError, Graph, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
@@ -287,7 +287,27 @@ impl Extended<'_> {
 
     /// The second derivative of a switching function.
     pub(super) fn form_of_surface(&self, j: usize) -> Result<Arc<Form>, ExprError> {
-        self.form_of(self.system.graph().clone().surface(j as u32))
+        let graph = self.system.graph();
+        self.form_of(graph, graph.clone().surface(j as u32))
+    }
+
+    /// The second derivative of the rate of a switching function along the field.
+    pub(super) fn form_of_rate(&self, j: usize) -> Result<Arc<Form>, ExprError> {
+        let mut graph = self.system.graph().clone();
+        let rate = self.rate_in(&mut graph, j);
+        self.form_of(&graph, rate)
+    }
+
+    /// The rate of a switching function along the field, in a copy of the graph.
+    pub(super) fn rate_in(&self, graph: &mut Graph, j: usize) -> NodeId {
+        let surface = graph.surface(j as u32);
+        let gradient = graph.gradient(surface);
+        let mut rate = gradient.time;
+        for (i, partial) in gradient.states {
+            let term = graph.mul(partial, self.system.field_nodes()[i as usize]);
+            rate = graph.add(rate, term);
+        }
+        rate
     }
 
     /// The second derivative of what the clock reads whose tick an action is, and its rate; `None` if the time does not move.
@@ -298,18 +318,21 @@ impl Extended<'_> {
     ) -> Result<Option<(Arc<Form>, f64)>, ExprError> {
         let argument = self.clocks.get(action).and_then(Option::as_ref);
         match (argument, self.clock(action, place)) {
-            (Some(argument), Some((rate, _))) => Ok(Some((self.form_of(argument.node)?, rate))),
+            (Some(argument), Some((rate, _))) => {
+                let form = self.form_of(self.system.graph(), argument.node)?;
+                Ok(Some((form, rate)))
+            }
             _ => Ok(None),
         }
     }
 
-    fn form_of(&self, node: NodeId) -> Result<Arc<Form>, ExprError> {
+    fn form_of(&self, graph: &Graph, node: NodeId) -> Result<Arc<Form>, ExprError> {
         let mut known = self.forms.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(form) = known.get(&node) {
             return Ok(Arc::clone(form));
         }
         let size = self.n + self.values.len();
-        let form = Arc::new(Form::new(self.system.graph(), &[node], size)?);
+        let form = Arc::new(Form::new(graph, &[node], size)?);
         known.insert(node, Arc::clone(&form));
         Ok(form)
     }

@@ -695,7 +695,7 @@ impl<'a> Piece<'a> {
     }
 
     /// The gradients of the rates of the surfaces in contact.
-    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
+    pub fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
         let gradient = |&j: &usize| {
             let mut row = Row::from_elem(0.0, z.len());
             self.extended
@@ -734,13 +734,16 @@ impl<'a> Piece<'a> {
             .map(|(_, normal)| normal)
             .collect();
         normals.extend(self.rate_normals(t, z)?);
+        Ok((!normals.is_empty()).then(|| self.held_by(normals)))
+    }
+
+    /// What takes from a change its parts along these gradients.
+    pub fn held_by(&self, normals: Rows) -> Change {
         let n = self.extended.n;
         let normals = independent(normals, n);
-        let directions = normals
-            .iter()
-            .map(|row| Row::from_slice(&row[..n]))
-            .collect();
-        Ok((!normals.is_empty()).then(|| Change::normal_to(normals, directions)))
+        let directions = normals.iter().map(|row| Row::from_slice(&row[..n]));
+        let directions = directions.collect();
+        Change::normal_to(normals, directions)
     }
 }
 

@@ -6,6 +6,8 @@
 
 use std::sync::Arc;
 
+use filippov_expr::NodeId;
+
 use super::change::Change;
 use super::extended::{Column, Extended};
 use super::forms::{add, form_by_differences, is_known, pairs, Form, Moved, Second};
@@ -61,18 +63,17 @@ impl SecondOrder<'_, '_> {
         };
         let z = extended.state(record.x[1]);
         let at = (record.t[1], &z[..], record.field[1]);
-        let mut found = match map {
-            None => behind(
-                self.after,
-                at,
-                &timed.changes,
-                (&timed.states, &timed.times),
-            )?,
+        let changes: Vec<(f64, Moved)> = match &map {
+            None => timed.changes.clone(),
             Some(map) => {
                 let changes = timed.changes.iter();
-                let changes: Vec<(f64, Moved)> = changes
-                    .map(|(tau, w)| (*tau, map.image(extended.n, w)))
-                    .collect();
+                let image = |(tau, w): &(f64, Moved)| (*tau, map.image(extended.n, w));
+                changes.map(image).collect()
+            }
+        };
+        let mut found = match map {
+            None => behind(self.after, at, &changes, (&timed.states, &timed.times))?,
+            Some(map) => {
                 let all = pairs(columns.len()).zip(timed.states.iter().zip(&timed.times));
                 let states = all.map(|((a, b), (state, tau))| {
                     let [a, b] = [a, b].map(|c| &timed.changes[c].1);
@@ -84,7 +85,11 @@ impl SecondOrder<'_, '_> {
         };
         let arrives = !record.acts.is_empty() && arrival(self.after, record.t[1], &z)?.is_some();
         if !arrives {
-            found.hold(self.after, record.t[1], &z)?;
+            let columns = changes
+                .iter()
+                .map(|(tau, w)| w.plus(-tau, record.field[1]).z);
+            let columns: Vec<Vec<f64>> = columns.collect();
+            found.hold(self.after, (record.t[1], &z), &columns)?;
         }
         Ok(Some((found, timed)))
     }
@@ -197,33 +202,51 @@ impl Bend {
 
 /// Are the surfaces slid on planes, and those in contact too, with rates that are affine?
 fn are_planes(piece: &Piece) -> bool {
-    let system = &piece.extended.system;
-    let mut graph = system.graph().clone();
-    let mut is_plane = |&j: &usize| {
-        let surface = graph.surface(j as u32);
-        graph.is_affine(surface)
-    };
-    let mut surfaces = piece.sliding.iter().chain(&piece.contacts);
-    if !surfaces.all(&mut is_plane) {
-        return false;
-    }
-    piece.contacts.iter().all(|&j| {
-        let surface = graph.surface(j as u32);
-        let states = graph.gradient(surface).states;
-        let mut rates = states
-            .iter()
-            .map(|(i, _)| system.field_nodes()[*i as usize]);
-        rates.all(|rate| graph.is_affine(rate))
-    })
+    let extended = piece.extended;
+    let mut graph = extended.system.graph().clone();
+    let surfaces = piece.sliding.iter().chain(&piece.contacts);
+    let surfaces: Vec<NodeId> = surfaces.map(|&j| graph.surface(j as u32)).collect();
+    let rates = piece.contacts.iter();
+    let rates: Vec<NodeId> = rates.map(|&j| extended.rate_in(&mut graph, j)).collect();
+    let mut all = surfaces.into_iter().chain(rates);
+    all.all(|node| graph.is_affine(node))
 }
 
 impl Second {
-    /// Takes from them what leads off planes that the motion keeps to: rounding, or what a limit left.
-    pub fn hold(&mut self, piece: &Piece, t: f64, z: &[f64]) -> Result<(), FieldError> {
-        if piece.codimension() > 0 && are_planes(piece) {
-            if let Some(held) = piece.projection(&[], t, z)? {
-                self.apply(piece.extended.n, &held, z.len());
-            }
+    /// Takes from them what leads off the surfaces that the motion keeps to, and off the rates of those in contact: rounding, what a
+    /// limit left, or what the map of an impact does not tell. `columns` are the first derivatives.
+    ///
+    /// Along a curve of states with h = 0 the second derivative m has dh m + d^2h(a, b) = 0.
+    pub fn hold(
+        &mut self,
+        piece: &Piece,
+        (t, z): (f64, &[f64]),
+        columns: &[Vec<f64>],
+    ) -> Result<(), FieldError> {
+        let extended = piece.extended;
+        let surfaces = piece.sliding.iter().chain(&piece.contacts);
+        let forms = surfaces.map(|&j| extended.form_of_surface(j));
+        let rates = piece.contacts.iter().map(|&j| extended.form_of_rate(j));
+        let forms: Result<Vec<Arc<Form>>, _> = forms.chain(rates).collect();
+        let Some(forms) = forms.ok().filter(|forms| !forms.is_empty()) else {
+            return Ok(());
+        };
+        let mut rows = piece.normals(t, z)?;
+        rows.extend(piece.rate_normals(t, z)?);
+        for ((a, b), mixed) in pairs(columns.len()).zip(&mut self.pairs) {
+            let along = [a, b].map(|c| Moved::of_state(&columns[c]));
+            let place = piece.at(t, z);
+            // What the form adds is the share of a last entry that is 1.
+            let rows = rows.iter().zip(&forms).map(|(row, form)| {
+                let mut row = row.clone();
+                row.push(form.at(&extended.system, &place, &along[0], &along[1])[0]);
+                row
+            });
+            let held = piece.held_by(rows.collect());
+            mixed.resize(z.len(), 0.0);
+            mixed.push(1.0);
+            held.apply(extended.n, mixed);
+            mixed.truncate(extended.n);
         }
         Ok(())
     }

@@ -356,6 +356,9 @@ impl<'a> Tangents<'a> {
             if piece.codimension() > 0 {
                 let z = extended.state(&extended.with_named(x_end, step.discrete));
                 piece.project(t1, &z, &mut self.columns)?;
+                if let Some(second) = &mut self.second {
+                    second.hold(&piece, (t1, &z), &self.columns)?;
+                }
             }
             let is_crossed = self.crosses_kept(&piece, step, (t0, t1), x_end)?;
             self.put_back(piece);
@@ -563,17 +566,20 @@ impl Tangents<'_> {
                 }
                 let z = extended.state(record.x[1]);
                 let (t, field) = (record.t[1], record.field[1]);
-                if let Some((times, states)) = &found.second {
+                let second = found.second.as_ref().map(|(times, states)| {
                     let changes = self.columns.iter().zip(&found.dt);
                     let changes: Vec<(f64, Moved)> = changes
                         .map(|(column, dt)| (*dt, Moved::of_state(column).plus(*dt, field)))
                         .collect();
-                    let mut second = behind(after, (t, &z, field), &changes, (states, times))?;
-                    second.hold(after, t, &z)?;
-                    self.second = Some(second);
                     limit.second_dt.clone_from(times);
-                }
+                    behind(after, (t, &z, field), &changes, (states, times))
+                });
                 after.project(t, &z, &mut self.columns)?;
+                if let Some(second) = second {
+                    let mut second = second?;
+                    second.hold(after, (t, &z), &self.columns)?;
+                    self.second = Some(second);
+                }
                 limit.dt = found.dt;
             }
         }
