@@ -145,6 +145,26 @@ def test_a_store_of_another_sweep_is_refused(model: Path, capsys: pytest.Capture
     assert shown.count("\n") == 1
 
 
+def test_the_state_of_the_file_may_have_names(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("model.py").read_text()
+    Path("named.py").write_text(text + "\ny0 = {'v': 2.0, 'y': 1.0}\n")
+    for name in ("model.py", "named.py"):
+        assert (
+            main(["sweep", name, "--param", "F=0.2,0.3", "--t", "5", "--csv", f"{name}.csv", "--quiet"]) == 0
+        )
+    assert Path("named.py.csv").read_text() == Path("model.py.csv").read_text()
+    assert main(["sweep", "named.py", "--y0", "y=0,1", "--t", "5", "--csv", "part.csv", "--quiet"]) == 0
+    assert [row["initial_y"] for row in rows(Path("part.csv"))] == ["0.0", "1.0"]
+    Path("named.py").write_text(text + "\ny0 = {'w': 2.0, 'y': 1.0}\n")
+    assert main(["solve", "named.py", "--t", "5"]) == 2
+    assert "y0 of the file: " in capsys.readouterr().err
+
+
+def test_a_sweep_that_keeps_no_return_says_so(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sweep", "model.py", "--param", "omega=0.3,0.5", "--period", "2*pi/omega", "--t", "20"]) == 0
+    assert "no returns: the runs end before" in capsys.readouterr().err
+
+
 def test_ends_are_followed_too(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ends = ["sweep", "model.py", "--param", "F=0.2,0.3", "--t", "5", "--csv", "-", "--quiet"]
     found = []

@@ -368,7 +368,16 @@ def test_branches_are_saved_and_go_on_from_any_point(tmp_path: Any) -> None:
     curve = fl.continuation(again.special["CS"][0], ("F", "omega"), {"F": (0.35, 0.5), "omega": (0.1, 2.0)})
     exact = POINTS["dry_friction_crossing_sliding"]["points"][2]
     assert abs(curve.at(F=0.5).params["omega"] - float(exact["omega"])) < 1e-10
-    path.write_text(path.read_text().replace('"version": 1', '"version": 99'))
+    softer = fl.System(
+        lambda t, x, F=0.4, omega=0.7: [x[1], -0.99 * x[0] + np.sin(omega * t) - F * np.sign(x[1])], n=2
+    )
+    with pytest.raises(fl.InputError, match="of another system"):
+        fl.cycles.load_branch(path, softer)
+    whole = path.read_text()
+    path.write_text(whole.replace('"params"', '"other"', 1))
+    with pytest.raises(fl.InputError, match="not complete: KeyError"):
+        fl.cycles.load_branch(path, system)
+    path.write_text(whole.replace('"version": 1', '"version": 99'))
     with pytest.raises(fl.InputError, match="version 99"):
         fl.cycles.load_branch(path, system)
     path.write_text("[1, 2]")

@@ -161,6 +161,12 @@ class TestCycles:
             distance = np.min(np.linalg.norm(curve.points.T - image, axis=1))
             assert distance < 0.03  # the points are up to 0.04 from one another
 
+    def test_a_long_one_has_no_gaps_between_images(self, cycle: fl.Cycle) -> None:
+        (curve,) = fl.manifold(cycle, length=40.0, sides=[-1])
+        gaps = np.linalg.norm(np.diff(curve.points, axis=1), axis=0)
+        assert gaps.sum() == pytest.approx(40.0, abs=1e-9)
+        assert gaps.max() < 0.0171  # a hundredth of twice the size of the cycle
+
     def test_with_a_negative_multiplier_each_side_comes_back_after_two_returns(self) -> None:
         """Between two period doublings the attractor of an impact oscillator is where the curves lead."""
         case = cases("K3_bifurcations")["impact_flip"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ import numpy as np
 from filippov import problems
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model
+from filippov.errors import InputError
+from filippov.options import check_y0
 
 __all__ = [
     "add_model_options",
@@ -23,6 +25,7 @@ __all__ = [
     "interval",
     "options_of_run",
     "parameters",
+    "state_of_file",
     "wants_progress",
 ]
 
@@ -126,7 +129,7 @@ def interval(given: argparse.Namespace, model: Model) -> tuple[float, float]:
 
 def initial_state(given: argparse.Namespace, model: Model) -> list[float]:
     """Return the initial state, from the command or from the file."""
-    default = None if model.y0 is None else _numbers(model.y0, "y0 of the file")
+    default = state_of_file(model)
     if given.y0 is None:
         if default is None:
             raise Mistake("--y0: the initial state is needed, `--y0 1 0`, or y0 = [1, 0] in the file")
@@ -144,6 +147,17 @@ def initial_state(given: argparse.Namespace, model: Model) -> list[float]:
     if missing:
         raise Mistake(f"--y0: no value for {', '.join(missing)}")
     return [value for value in state if value is not None]
+
+
+def state_of_file(model: Model) -> list[float] | None:
+    """Return the initial state of the file, which may be given by the names of the states."""
+    if not isinstance(model.y0, Mapping):
+        return None if model.y0 is None else _numbers(model.y0, "y0 of the file")
+    try:
+        found: list[float] = check_y0(model.y0, "y0 of the file", model.system._states).tolist()
+    except InputError as error:
+        raise Mistake(str(error)) from None
+    return found
 
 
 def _numbers(values: Sequence[Any], what: str) -> list[float]:

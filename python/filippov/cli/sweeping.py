@@ -18,7 +18,7 @@ from filippov.cli.expressions import expression
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model, load_model
 from filippov.cli.pictures import write_picture
-from filippov.cli.solving import initial_state, interval, options_of_run, wants_progress
+from filippov.cli.solving import initial_state, interval, options_of_run, state_of_file, wants_progress
 from filippov.cli.tables import write_rows
 from filippov.cli.targets import STDOUT, check_folder, check_targets, write_json
 from filippov.errors import Interrupted
@@ -175,7 +175,8 @@ def _initial_states(given: argparse.Namespace, model: Model) -> Any:
     if not all("=" in text for text in given.y0):
         raise Mistake("--y0: ranges need names, like --y0 x=-2:2:50 v=0")
     found = _values(given.y0, "--y0", names)
-    default = dict(zip(names, np.ravel(model.y0), strict=True)) if model.y0 is not None else {}
+    own = state_of_file(model)
+    default = dict(zip(names, own, strict=True)) if own is not None else {}
     missing = [name for name in names if name not in found and name not in default]
     if missing:
         raise Mistake(f"--y0: no value for {', '.join(missing)}")
@@ -221,6 +222,10 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
         periods, counts = np.unique(result.period.values, return_counts=True)
         shown = [f"{p or 'none'}: {c}" for p, c in zip(periods, counts, strict=True)]
         say(given, f"returns:  {result.sizes['obs']}; points by period found: {', '.join(shown)}")
+        if result.sizes["obs"] == 0:
+            print(
+                "warning:  no returns: the runs end before the first that is kept; see --t", file=sys.stderr
+            )
     if "attractor" in result:
         shares = [f"{number}: {share:.3g}" for number, share in enumerate(result.attractor_size.values)]
         more = ", ..." if len(shares) > _MOST_NAMED else ""

@@ -360,32 +360,24 @@ def _images(
         return known[k]
 
     # A place on the segment is s from 0 to 1, where the segment becomes its first image.
-    seeds = [i / _FIRST_POINTS for i in range(_FIRST_POINTS)]
-    points, done, k = [returns.point], 0.0, 0
+    seeds = [i / _FIRST_POINTS for i in range(1, _FIRST_POINTS)]
+    points, done, k = [returns.point, image(0.0, 0)], _START * size, 0
     while True:
         i = 0
-        while i < len(seeds):
+        while i <= len(seeds):
+            s = seeds[i] if i < len(seeds) else 1.0
             try:
-                here = image(seeds[i], k)
+                here = image(s, k) if s < 1.0 else image(0.0, k + 1)
             except Stuck as error:
                 return _finished(side, points, done, str(error))
             gap = float(np.linalg.norm(here - points[-1]))
-            before = seeds[i - 1] if i else seeds[-1] - 1.0
             if gap > largest and k > 0:
-                width = seeds[i] - before
+                before = seeds[i - 1] if i else 0.0
                 if len(points) > _MOST_POINTS or len(orbits) > _MOST_POINTS:
                     return _finished(side, points, done, f"it needs more than {_MOST_POINTS} points")
-                if width < 1e-9:
+                if s - before < 1e-9:
                     return _finished(side, points, done, "the return map jumps there")
-                middle = before + 0.5 * width
-                if middle >= 0.0:
-                    seeds.insert(i, middle)
-                    continue
-                # The gap is between the last point of the image before and the first of this one.
-                seeds.append(middle + 1.0)
-                extra = image(seeds[-1], k - 1)
-                done += float(np.linalg.norm(extra - points[-1]))
-                points.append(extra)
+                seeds.insert(i, 0.5 * (before + s))
                 continue
             if done + gap >= length:
                 points.append(points[-1] + (length - done) / gap * (here - points[-1]))

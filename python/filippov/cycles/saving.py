@@ -13,6 +13,7 @@ import numpy as np
 from filippov.cycles.branch import Branch, Point, Special, State
 from filippov.cycles.curves import OnCurve
 from filippov.cycles.cycle import Cycle
+from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod, TickedPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
@@ -25,6 +26,8 @@ from filippov.system import System
 __all__ = ["load_branch", "save_branch"]
 
 _FORMAT, _VERSION = "filippov branch", 1
+# A Newton step of a state that is in the file to the last bit is shorter than this part of its size.
+_FITS = 1e-6
 
 
 def save_branch(branch: Branch, path: str | os.PathLike[str]) -> None:
@@ -73,7 +76,8 @@ def load_branch(
     Raises
     ------
     InputError
-        If the file is none, or of a later version.
+        If the file is none or not complete, of a later version, or of another system: if its first state is
+        no equilibrium or cycle of this one.
 
     Examples
     --------
@@ -96,6 +100,30 @@ def load_branch(
         raise InputError(
             f"{path}: the file is of version {data['version']}, this program reads up to {_VERSION}"
         )
+    try:
+        branch = _branch(data, system, period)
+    except (KeyError, IndexError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: the file is not complete: {error!r}") from error
+    if not _fits(branch.points[0].state):
+        raise InputError(
+            f"{path}: the branch is one of another system: its first state is none of {system!r}"
+        )
+    return branch
+
+
+def _fits(state: State) -> bool:
+    """Whether a state solves its own equations, to about a millionth of its size."""
+    curve = state._curve if isinstance(state, Equilibrium) else CycleCurve(state, (), ())
+    w = state._w if isinstance(state, Equilibrium) else state._u
+    residual, jacobian = curve.equations(w)
+    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+        return False
+    scale = curve.scales(w)
+    change = np.linalg.lstsq(jacobian * scale, residual, rcond=1e-9)[0]
+    return bool(np.all(np.abs(change) < _FITS))
+
+
+def _branch(data: Mapping[str, Any], system: System, period: Any) -> Branch:
     build = _Builder(data, system, period)
     points = [
         Point(row["params"], build.state(row), {tuple(_tupled(key)): value for key, value in row["tests"]})
