@@ -277,7 +277,7 @@ fn number(value: f64) -> String {
     let text = format!("{value:?}");
     match text.strip_suffix(".0") {
         Some(integer) => integer.to_string(),
-        None => text.to_lowercase(),
+        None => text.to_ascii_lowercase(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use smallvec::smallvec;
+use smallvec::{smallvec, SmallVec};
 
 use super::point::{Left, Lefts, Notes, Point, Values};
 use crate::error::FieldError;
@@ -32,6 +32,9 @@ impl Germ {
         }
     }
 }
+
+/// Coefficients of a guard, from order 0 on.
+type Coefficients = SmallVec<[f64; MAX_LIE_ORDER + 1]>;
 
 /// The Taylor coefficients of the motion in a mode.
 pub(super) struct MotionSeries {
@@ -82,6 +85,10 @@ impl MotionSeries {
         })
     }
 
+    fn orders(&self) -> std::ops::RangeInclusive<usize> {
+        0..=self.jets.order()
+    }
+
     /// How h_j begins.
     pub fn of_surface(&self, at: &Point, j: usize) -> Result<Germ, FieldError> {
         let mut gradient = vec![0.0; self.n];
@@ -107,8 +114,10 @@ impl MotionSeries {
                 None => dot(&gradient, &row[..self.n]) + if k == 1 { rate } else { 0.0 },
             }
         };
+        let coefficients: Coefficients = self.orders().map(coefficient).collect();
+        let sizes: Coefficients = self.orders().map(size).collect();
         // The point is on the surface.
-        Ok(self.first(1, coefficient, size))
+        Ok(self.first(1, &coefficients, &sizes))
     }
 
     /// How the exit function with this index begins, where multipliers that differ by `blur` are one.
@@ -117,47 +126,51 @@ impl MotionSeries {
             return Germ::Unknown;
         };
         let width = self.jets.width();
-        let coefficient = |k: usize| self.rows[k * width + place];
+        let coefficients: Coefficients = self
+            .orders()
+            .map(|k| self.rows[k * width + place])
+            .collect();
         let fastest = self.rates.iter().copied().fold(0.0, f64::max);
-        let orders = 0..=self.jets.order();
-        let largest = orders.map(|k| coefficient(k).abs() / fastest.powi(k as i32));
+        let largest = self
+            .orders()
+            .map(|k| coefficients[k].abs() / fastest.powi(k as i32));
         let largest = largest.filter(|v| v.is_finite()).fold(0.0, f64::max);
         // The value itself is a difference of numbers of size 1.
         let of_value = (blur / VANISHING_GERM).max(1.0);
         let least = |k: usize| if k == 0 { of_value } else { 0.0 };
-        self.first(0, coefficient, |k| {
-            least(k).max(largest * fastest.powi(k as i32))
-        })
+        let sizes = self
+            .orders()
+            .map(|k| least(k).max(largest * fastest.powi(k as i32)));
+        self.first(0, &coefficients, &sizes.collect::<Coefficients>())
     }
 
     /// Does a series with these coefficients converge within rounding of the place only? So it is with powers of a distance that is
     /// zero, such as 1.5, in which rounding has left something.
-    fn ends_within_rounding(&self, coefficient: impl Fn(usize) -> f64) -> bool {
-        let last = self.jets.order();
-        let growth = |m: usize| {
-            let ratio = coefficient(last).abs() / coefficient(last - m).abs();
-            power(ratio, 1.0 / m as f64)
+    fn ends_within_rounding(&self, coefficients: &[f64]) -> bool {
+        let Some((last, earlier)) = coefficients.split_last() else {
+            return false;
         };
-        (1..last.min(5)).all(|m| growth(m) * self.rounding_of_time > 1.0)
+        let before = earlier.iter().rev().zip(1..MAX_LIE_ORDER - 1);
+        before
+            .map(|(c, m)| (last.abs() / c.abs(), m))
+            .all(|(ratio, m)| {
+                let growth = power(ratio, 1.0 / m as f64);
+                growth * self.rounding_of_time > 1.0
+            })
     }
 
-    fn first(
-        &self,
-        from: usize,
-        coefficient: impl Fn(usize) -> f64,
-        size: impl Fn(usize) -> f64,
-    ) -> Germ {
-        if self.ends_within_rounding(&coefficient) {
+    /// The first coefficient from this one that is clear of the rounding of numbers of these sizes.
+    fn first(&self, from: usize, coefficients: &[f64], sizes: &[f64]) -> Germ {
+        if self.ends_within_rounding(coefficients) {
             return Germ::Unknown;
         }
         let mut factorial = 1.0;
-        for k in 0..=self.jets.order() {
+        for (k, (c, size)) in coefficients.iter().zip(sizes).enumerate() {
             factorial *= k.max(1) as f64;
-            let c = coefficient(k);
             if !c.is_finite() {
                 return Germ::Unknown;
             }
-            if k >= from && c.abs() > VANISHING_GERM * size(k) {
+            if k >= from && c.abs() > VANISHING_GERM * size {
                 return Germ::Begins(Leading {
                     order: k,
                     value: c * factorial,

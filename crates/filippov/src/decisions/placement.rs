@@ -10,7 +10,7 @@ use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ContactField, SmoothField};
 use crate::status::Stop;
-use crate::system::{dot, surfaces_that_matter, Action};
+use crate::system::{dot, surfaces_that_matter};
 use crate::tolerances::{AT_SIDE, ERRORS_OF_STEPS, FRICTION_IN_MAP, MOMENT, ROUNDING, SLOW};
 use smallvec::SmallVec;
 
@@ -173,18 +173,32 @@ fn slipped_through(
 
 /// Do the actions at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
 pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
-    let actions = at.actions.from_side(j, if signs[j] < 0.0 { -1 } else { 1 });
-    let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
-    for action in &actions {
-        action.map.apply(at.t, &mut moved, signs, &mut q)?;
+    if at.actions.at_surface(j).is_none() {
+        return Ok(false);
     }
+    let mut moved = at.x.to_vec();
+    act_from_side(at, j, signs, &mut moved)?;
     let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
     at.system
         .surfaces(&at.place_at(at.t, at.x, signs), &mut h[0])?;
     at.system
         .surfaces(&at.place_at(at.t, &moved, signs), &mut h[1])?;
     let size = at.system.surface_size(j, &at.place(signs))?;
-    Ok(!actions.is_empty() && (h[0][j] - h[1][j]).abs() <= ROUNDING * size)
+    Ok((h[0][j] - h[1][j]).abs() <= ROUNDING * size)
+}
+
+/// What the actions at surface `j` make of a state, for a motion on the side of these signs.
+pub(super) fn act_from_side(
+    at: &Point,
+    j: usize,
+    signs: &[f64],
+    x: &mut [f64],
+) -> Result<(), FieldError> {
+    let mut q = at.q.to_vec();
+    for action in at.actions.from_side(j, if signs[j] < 0.0 { -1 } else { 1 }) {
+        action.map.apply(at.t, x, signs, &mut q)?;
+    }
+    Ok(())
 }
 
 /// The point moved back onto the triggers that it slipped through, if there are any.
@@ -355,10 +369,10 @@ enum Touching {
 
 fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError> {
     let side = mode.entries()[j];
-    let impact = Impact::new(at, j, mode)?;
-    let Some(first) = impact.actions.first() else {
+    let Some(first) = at.actions.from_side(j, side).next() else {
         return Ok(Touching::NoContact);
     };
+    let impact = Impact::new(at, j, mode)?;
     let moved = impact.applied(at.x)?;
     let size = dot(at.x, at.x).sqrt();
     let shift: Vec<f64> = moved.iter().zip(at.x).map(|(m, x)| m - x).collect();
@@ -397,7 +411,7 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
 /// The actions at a surface that is touched without velocity, as an impact.
 struct Impact<'p, 'm, 'a> {
     at: &'p Point<'p, 'm, 'a>,
-    actions: SmallVec<[&'p Action<'p>; 1]>,
+    j: usize,
     signs: Signs,
     /// The gradient of h_j' by the state: the direction of the normal velocity.
     normal: Vec<f64>,
@@ -417,7 +431,7 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         let approach = -f64::from(mode.entries()[j]) * MOMENT * slow / size;
         Ok(Impact {
             at,
-            actions: at.actions.from_side(j, mode.entries()[j]),
+            j,
             signs,
             normal,
             slow,
@@ -427,12 +441,8 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
 
     /// The state after the actions.
     fn applied(&self, x: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let (mut moved, mut q) = (x.to_vec(), self.at.q.to_vec());
-        for action in &self.actions {
-            action
-                .map
-                .apply(self.at.t, &mut moved, &self.signs, &mut q)?;
-        }
+        let mut moved = x.to_vec();
+        act_from_side(self.at, self.j, &self.signs, &mut moved)?;
         Ok(moved)
     }
 

@@ -1,6 +1,6 @@
 //! Warnings about the side from which an action is triggered.
 
-use super::placement::{is_slow, leaves_point_alone};
+use super::placement::{act_from_side, is_slow, leaves_point_alone};
 use super::point::{Notes, Point};
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -37,10 +37,8 @@ pub(crate) fn warn_against_direction(
 /// Would the action at surface `j`, on which the point lies, leave the motion on the side of the mode?
 fn would_turn_back(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
     let (side, signs) = (mode.entries()[j], mode.signs());
-    let (mut x, mut q) = (at.x.to_vec(), at.q.to_vec());
-    for action in at.actions.from_side(j, side) {
-        action.map.apply(at.t, &mut x, &signs, &mut q)?;
-    }
+    let mut x = at.x.to_vec();
+    act_from_side(at, j, &signs, &mut x)?;
     let mut h = vec![0.0; signs.len()];
     at.system.surfaces(&at.place_at(at.t, &x, &signs), &mut h)?;
     if !leaves_point_alone(at, j, &signs)? {

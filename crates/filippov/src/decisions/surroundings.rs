@@ -42,12 +42,14 @@ impl Surroundings {
             let mut largest = DOUBTFUL * fields.row_size(i);
             // Also beyond each of the surfaces whose signs multiply its own: a force that begins there.
             let group = groups.iter().find(|group| group.contains(&j));
-            let others = group.into_iter().flatten().filter(|&&k| k != j);
-            let beyond = others.map(|&k| mode.with(k, -mode.entries()[k]));
-            let modes = std::iter::once(mode.clone()).chain(beyond);
-            let sides = modes.flat_map(|mode| [-1, 1].map(|side| mode.with(j, side)));
-            for mode in sides.take_while(|_| !at.patience.is_over()) {
-                let signs = mode.signs();
+            let group = group.map_or(&surfaces[i..=i], |group| group);
+            for pattern in 0..2 * group.len() {
+                if at.patience.is_over() {
+                    break;
+                }
+                let k = group[pattern / 2];
+                let beyond = mode.with(k, -mode.entries()[k]);
+                let signs = beyond.with(j, [-1, 1][pattern % 2]).signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;

@@ -5,8 +5,6 @@
 //! clock) and a map (t, x, s, q) -> (x+, q+). Impacts, impulses, sampled controllers, relays with hysteresis and
 //! quantisers are all made of these.
 
-use smallvec::SmallVec;
-
 use super::Clock;
 use crate::error::FieldError;
 use crate::switch::Kind;
@@ -186,19 +184,16 @@ impl Actions<'_> {
         }
     }
 
-    /// The actions that surface `j` triggers for a motion from `side`, in order; if there are none, the first of all.
-    pub fn from_side(&self, j: usize, side: i8) -> SmallVec<[&Action<'_>; 1]> {
-        let meant = |(_, direction, _): &(_, i8, _)| *direction == 0 || *direction == -side;
-        let found = self.all_at_surface(j).filter(meant);
-        let found: SmallVec<_> = found.map(|(action, ..)| action).collect();
-        match found.is_empty() {
-            true => self
-                .at_surface(j)
-                .map(|(first, _)| first)
-                .into_iter()
-                .collect(),
-            false => found,
-        }
+    /// The actions that surface `j` triggers for a motion from `side`, in order; if there are none, those from the other side.
+    pub fn from_side(&self, j: usize, side: i8) -> impl Iterator<Item = &Action<'_>> {
+        let meant = move |direction: i8| direction == 0 || direction == -side;
+        let is_any = self
+            .all_at_surface(j)
+            .any(|(_, direction, _)| meant(direction));
+        let found = self.all_at_surface(j);
+        found.filter_map(move |(action, direction, _)| {
+            (!is_any || meant(direction)).then_some(action)
+        })
     }
 
     /// The actions, by their place in the list, that surface `j` triggers for a motion that comes from `side`.
