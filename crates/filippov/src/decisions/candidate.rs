@@ -4,15 +4,16 @@ use super::blow_up::beginnings;
 use super::germ::{Germ, MotionSeries};
 use super::point::{Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
+use super::trial::{try_mode, Trial};
 
 use crate::cube::{is_undetermined, stable_roots_with_border, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{first_nonzero, first_nonzero_inside, Leading, TwoFold};
+use crate::motion::{first_nonzero, Leading, TwoFold};
 use crate::motion::{Guard, MeetingFields, RootEnd, Tie};
 use crate::system::dot;
 use crate::system::eval_on_side;
-use crate::tolerances::{AT_SIDE, DOUBTFUL, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, ROUNDING, TANGENT};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -228,11 +229,7 @@ impl Candidate<'_> {
                 None => Germ::Unknown,
             };
             if lambda.is_empty() && germ == Germ::Unknown {
-                let signs = mode.signs();
-                let leading = match series {
-                    Some(_) => first_nonzero_inside(at.system, j, side, &at.place(&signs))?,
-                    None => first_nonzero(at.system, j, side, 1, &at.place(&signs))?,
-                };
+                let leading = first_nonzero(at.system, j, side, 1, &at.place(&mode.signs()))?;
                 germ = Germ::of(leading, Germ::Zero);
             }
             if germ != Germ::Zero {
@@ -341,11 +338,15 @@ impl Candidate<'_> {
         if matches!(self.meeting.how, How::Event(_)) {
             two_fold = two_fold.located();
         }
-        if !two_fold.is_regular()? {
-            // Where both fields are the same there is one motion, whatever the multiplier, and a trial tells.
-            return Ok(match self.is_same_on_sides(at, notes, slid)? {
-                true => Verdict::Open(self.outset(&[]).viable.next),
-                false => Verdict::Untold,
+        if !two_fold.is_regular()? && self.is_same_on_sides(at, notes, slid)? {
+            // There is one motion, whatever the multiplier. A trial tells of it, and it counts if there is no other one.
+            let next = self.outset(&[]).viable.next;
+            let trial = try_mode(at, notes, &next, self.meeting.surfaces, ROUNDING)?;
+            return Ok(match trial {
+                Trial::Leaves(left) => {
+                    Verdict::Fades(self.guard(), Viable::strictly(Next { left, ..next }))
+                }
+                _ => Verdict::Fails(self.guard()),
             });
         }
         let [minus, plus] = Guard::ends(slid);

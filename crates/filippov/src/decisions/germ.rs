@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use smallvec::{smallvec, SmallVec};
+use smallvec::smallvec;
 
 use super::point::{Left, Lefts, Notes, Point, Values};
 use crate::error::FieldError;
@@ -10,7 +10,7 @@ use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::powers::power;
 use crate::system::{dot, AffineParts, MotionJets};
-use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, ROUNDING, VANISHING_GERM};
+use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
 
 /// How a guard begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub(super) enum Germ {
     Begins(Leading),
     /// All derivatives up to the highest order vanish.
     Zero,
-    /// A derivative does not exist at the point, or within rounding of it.
+    /// A derivative does not exist at the point.
     Unknown,
 }
 
@@ -33,9 +33,6 @@ impl Germ {
     }
 }
 
-/// Coefficients of a guard, from order 0 on.
-type Coefficients = SmallVec<[f64; MAX_LIE_ORDER + 1]>;
-
 /// The Taylor coefficients of the motion in a mode.
 pub(super) struct MotionSeries {
     jets: Arc<MotionJets>,
@@ -46,8 +43,6 @@ pub(super) struct MotionSeries {
     rates: Vec<f64>,
     sizes: Vec<f64>,
     pace: f64,
-    /// The time in which the motion passes what rounding makes of the place.
-    rounding_of_time: f64,
 }
 
 impl MotionSeries {
@@ -71,10 +66,8 @@ impl MotionSeries {
             let rates = orders.map(|k| power(of(i, k), 1.0 / k as f64));
             rates.filter(|rate| rate.is_finite()).fold(speed, f64::max)
         };
-        let rates: Vec<f64> = (0..n).map(rate).collect();
-        let across = if speed > 0.0 { 1.0 / speed } else { 0.0 };
+        let rates = (0..n).map(rate).collect();
         Some(MotionSeries {
-            rounding_of_time: ROUNDING * (at.t.abs() + across),
             pace,
             jets,
             signs,
@@ -83,10 +76,6 @@ impl MotionSeries {
             rates,
             sizes,
         })
-    }
-
-    fn orders(&self) -> std::ops::RangeInclusive<usize> {
-        0..=self.jets.order()
     }
 
     /// How h_j begins.
@@ -114,10 +103,8 @@ impl MotionSeries {
                 None => dot(&gradient, &row[..self.n]) + if k == 1 { rate } else { 0.0 },
             }
         };
-        let coefficients: Coefficients = self.orders().map(coefficient).collect();
-        let sizes: Coefficients = self.orders().map(size).collect();
         // The point is on the surface.
-        Ok(self.first(1, &coefficients, &sizes))
+        Ok(self.first(1, coefficient, size))
     }
 
     /// How the exit function with this index begins, where multipliers that differ by `blur` are one.
@@ -126,51 +113,33 @@ impl MotionSeries {
             return Germ::Unknown;
         };
         let width = self.jets.width();
-        let coefficients: Coefficients = self
-            .orders()
-            .map(|k| self.rows[k * width + place])
-            .collect();
+        let coefficient = |k: usize| self.rows[k * width + place];
         let fastest = self.rates.iter().copied().fold(0.0, f64::max);
-        let largest = self
-            .orders()
-            .map(|k| coefficients[k].abs() / fastest.powi(k as i32));
+        let orders = 0..=self.jets.order();
+        let largest = orders.map(|k| coefficient(k).abs() / fastest.powi(k as i32));
         let largest = largest.filter(|v| v.is_finite()).fold(0.0, f64::max);
         // The value itself is a difference of numbers of size 1.
         let of_value = (blur / VANISHING_GERM).max(1.0);
         let least = |k: usize| if k == 0 { of_value } else { 0.0 };
-        let sizes = self
-            .orders()
-            .map(|k| least(k).max(largest * fastest.powi(k as i32)));
-        self.first(0, &coefficients, &sizes.collect::<Coefficients>())
+        self.first(0, coefficient, |k| {
+            least(k).max(largest * fastest.powi(k as i32))
+        })
     }
 
-    /// Does a series with these coefficients converge within rounding of the place only? So it is with powers of a distance that is
-    /// zero, such as 1.5, in which rounding has left something.
-    fn ends_within_rounding(&self, coefficients: &[f64]) -> bool {
-        let Some((last, earlier)) = coefficients.split_last() else {
-            return false;
-        };
-        let before = earlier.iter().rev().zip(1..MAX_LIE_ORDER - 1);
-        before
-            .map(|(c, m)| (last.abs() / c.abs(), m))
-            .all(|(ratio, m)| {
-                let growth = power(ratio, 1.0 / m as f64);
-                growth * self.rounding_of_time > 1.0
-            })
-    }
-
-    /// The first coefficient from this one that is clear of the rounding of numbers of these sizes.
-    fn first(&self, from: usize, coefficients: &[f64], sizes: &[f64]) -> Germ {
-        if self.ends_within_rounding(coefficients) {
-            return Germ::Unknown;
-        }
+    fn first(
+        &self,
+        from: usize,
+        coefficient: impl Fn(usize) -> f64,
+        size: impl Fn(usize) -> f64,
+    ) -> Germ {
         let mut factorial = 1.0;
-        for (k, (c, size)) in coefficients.iter().zip(sizes).enumerate() {
+        for k in 0..=self.jets.order() {
             factorial *= k.max(1) as f64;
+            let c = coefficient(k);
             if !c.is_finite() {
                 return Germ::Unknown;
             }
-            if k >= from && c.abs() > VANISHING_GERM * size {
+            if k >= from && c.abs() > VANISHING_GERM * size(k) {
                 return Germ::Begins(Leading {
                     order: k,
                     value: c * factorial,

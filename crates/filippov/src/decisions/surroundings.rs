@@ -40,16 +40,8 @@ impl Surroundings {
         let mut noise = Vec::with_capacity(surfaces.len());
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            // Also beyond each of the surfaces whose signs multiply its own: a force that begins there.
-            let group = groups.iter().find(|group| group.contains(&j));
-            let group = group.map_or(&surfaces[i..=i], |group| group);
-            for pattern in 0..2 * group.len() {
-                if at.patience.is_over() {
-                    break;
-                }
-                let k = group[pattern / 2];
-                let beyond = mode.with(k, -mode.entries()[k]);
-                let signs = beyond.with(j, [-1, 1][pattern % 2]).signs();
+            for side in [-1, 1] {
+                let signs = mode.with(j, side).signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;

@@ -49,25 +49,9 @@ pub fn first_nonzero(
     let mut signs_side = Signs::from_slice(place.signs);
     signs_side[j] = f64::from(side);
     let on_side = place.with_signs(&signs_side);
-    match scan(system, j, side, vanishing, &on_side)? {
-        Some(leading) => Ok(leading),
-        None => first_nonzero_inside(system, j, side, &on_side),
+    if let Some(leading) = scan(system, j, side, vanishing, &on_side)? {
+        return Ok(leading);
     }
-}
-
-/// As [`first_nonzero`], where the point itself is known to tell nothing.
-///
-/// # Errors
-/// If a function of the user raises.
-pub(crate) fn first_nonzero_inside(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    side: i8,
-    place: &Place<'_>,
-) -> Result<Leading, FieldError> {
-    let mut signs_side = Signs::from_slice(place.signs);
-    signs_side[j] = f64::from(side);
-    let on_side = place.with_signs(&signs_side);
     for offset in side_offsets(place.x) {
         let (t, inside) = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
         if let Some(leading) = scan(system, j, side, 0, &on_side.moved(t, &inside))? {

@@ -17,8 +17,8 @@ use smallvec::{smallvec, SmallVec};
 use super::leading::Leading;
 use crate::error::FieldError;
 use crate::powers::power;
-use crate::system::{dot, LieValue, PiecewiseSystem, Place};
-use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, ROUNDING, TANGENT};
+use crate::system::{LieValue, PiecewiseSystem, Place};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 
 /// A sliding motion through a two-fold. It starts there if it attracts. If it repels it is a solution too, but one that may
 /// leave to either side at any time.
@@ -79,10 +79,6 @@ pub struct TwoFold<'s> {
     at: TangentPoint<'s>,
     /// The derivatives of h.
     own: Words,
-    /// The length of the shortest words that do not vanish, once that is known.
-    first: Option<Option<usize>>,
-    /// Are there words that vanish within rounding of the place only?
-    is_lost: bool,
 }
 
 /// Where both fields are tangent.
@@ -124,12 +120,7 @@ impl<'s> TwoFold<'s> {
             highest: system.max_lie_order().min(MAX_LIE_ORDER),
         };
         let own = Words::of(j);
-        TwoFold {
-            at,
-            own,
-            first: None,
-            is_lost: false,
-        }
+        TwoFold { at, own }
     }
 
     /// The same at a located event, where the fields are known less well.
@@ -153,17 +144,16 @@ impl<'s> TwoFold<'s> {
         Ok(if is_clear { mean.value } else { 0.0 })
     }
 
-    /// Do derivatives tell how h begins? Those of (h_k)^1.5 on h_k = 0 are not finite, or change within rounding of the place.
+    /// Are the first derivatives of h finite that do not vanish? Those of (h_k)^1.5 on h_k = 0 are not. A root is steep at once, and
+    /// holds no motion.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn is_regular(&mut self) -> Result<bool, FieldError> {
-        Ok(match self.first_length()? {
-            Some(length) => self.own.values[length]
-                .iter()
-                .all(|lie| lie.value.is_finite()),
-            None => !self.is_lost,
-        })
+        let steepest = self.at.known + 1;
+        let first = self.first_length()?.filter(|length| *length > steepest);
+        let words = first.map_or(&[][..], |length| &self.own.values[length]);
+        Ok(words.iter().all(|lie| lie.value.is_finite()))
     }
 
     /// All sliding motions from here.
@@ -231,36 +221,16 @@ impl<'s> TwoFold<'s> {
         Ok(NONE)
     }
 
-    /// The length of the shortest words that do not vanish. The place is known to rounding: words that change by more within
-    /// that do vanish.
+    /// The length of the shortest words that do not vanish.
     fn first_length(&mut self) -> Result<Option<usize>, FieldError> {
-        if let Some(known) = self.first {
-            return Ok(known);
-        }
-        let mut found = None;
-        let rounding = self.at.rounding_of_time()?;
         for length in self.at.known + 1..=self.at.highest {
             self.own.fill(&self.at, length)?;
-            // The last ones have none to compare them with.
-            if self.own.largest(length) == 0.0 || length == self.at.highest && self.is_lost {
-                continue;
+            let mut words = self.own.values[length].iter();
+            if words.any(|lie| lie.value != 0.0) {
+                return Ok(Some(length));
             }
-            if length < self.at.highest {
-                self.own.fill(&self.at, length + 1)?;
-                let change = rounding * self.own.largest(length + 1);
-                if change.is_finite() && self.own.largest(length) <= change {
-                    self.own.values[length]
-                        .iter_mut()
-                        .for_each(|lie| lie.value = 0.0);
-                    self.is_lost = true;
-                    continue;
-                }
-            }
-            found = Some(length);
-            break;
         }
-        self.first = Some(found);
-        Ok(found)
+        Ok(None)
     }
 
     /// The shares of f+ with which a motion can begin to slide.
@@ -328,27 +298,7 @@ const NONE: Leading = Leading {
     value: 0.0,
 };
 
-impl TangentPoint<'_> {
-    /// The time in which a motion passes what rounding makes of the place.
-    fn rounding_of_time(&self) -> Result<f64, FieldError> {
-        let mut velocity = vec![0.0; self.place.x.len()];
-        self.system.field(&self.place, &mut velocity)?;
-        let speed = dot(&velocity, &velocity).sqrt();
-        let across = dot(self.place.x, self.place.x).sqrt() / speed.max(f64::MIN_POSITIVE);
-        Ok(ROUNDING * (self.place.t.abs() + if across.is_finite() { across } else { 0.0 }))
-    }
-}
-
 impl Words {
-    /// The largest word of a length.
-    fn largest(&self, length: usize) -> f64 {
-        let words = self.values[length].iter();
-        words.fold(0.0, |most, lie| match lie.value.is_nan() {
-            true => f64::INFINITY,
-            false => lie.value.abs().max(most),
-        })
-    }
-
     fn of(surface: usize) -> Self {
         Words {
             surface,
