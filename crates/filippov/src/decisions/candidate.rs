@@ -339,7 +339,8 @@ impl Candidate<'_> {
             two_fold = two_fold.located();
         }
         if !two_fold.is_regular()? && self.is_same_on_sides(at, notes, slid)? {
-            // There is one motion, whatever the multiplier. A trial tells of it, and it counts if there is no other one.
+            // Both fields agree, so every multiplier gives the same motion. We follow it for a moment, and take it if no other mode
+            // is viable.
             let next = self.outset(&[]).viable.next;
             let trial = try_mode(at, notes, &next, self.meeting.surfaces, ROUNDING)?;
             return Ok(match trial {
