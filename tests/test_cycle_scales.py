@@ -191,3 +191,28 @@ def test_a_branch_in_other_units(length: float, time: float) -> None:
         periods = [branch.at(V=V).period / other for V in (0.13, 0.5, 0.88)]
         found.append((branch.special["GS"][0].params["V"], cycle.period / other, *periods))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e-3, 1.0, 1e6])
+def test_units_of_time_do_not_change_a_branch_without_switches(unit: float) -> None:
+    # The band of Roessler, with a velocity in the place of the second state.
+    def band(t: Any, x: Any, c: float = 2.5) -> list[Any]:
+        a, b, z = x[0], x[1] * unit, x[2]
+        return [(-b - z) / unit, (a + 0.2 * b) / unit**2, (0.2 + z * (a - c)) / unit]
+
+    tolerance = {"rtol": 1e-10, "atol": np.array([1e-10, 1e-10 / unit, 1e-10])}
+    cycle = fl.limit_cycle(fl.System(band, n=3), [1.0, 1.0 / unit, 0.0], **tolerance)
+    branch = fl.continuation(cycle, "c", (1.5, 4.5))
+    assert [point.code for point in branch.special if point.code != "EP"] == ["PD"]
+    assert abs(branch.special["PD"][0].params["c"] - 2.832445027862) < 1e-9
+    assert branch.values("c")[[0, -1]].tolist() == [1.5, 4.5]
+
+
+def test_a_cycle_with_velocities_in_nanoseconds_does_not_grow_without_bound() -> None:
+    unit = 1e-9
+
+    def van_der_pol(t: Any, x: Any) -> list[Any]:
+        return [x[1], (1 - x[0] ** 2) * x[1] / unit - x[0] / unit**2]
+
+    cycle = fl.limit_cycle(fl.System(van_der_pol, n=2), [2.0, 0.0], atol=[1e-9, 1.0])
+    assert abs(cycle.period / unit - 6.663286859323) < 1e-8

@@ -290,9 +290,63 @@ def test_a_cycle_of_a_family_has_no_derivative() -> None:
 
 def test_an_equilibrium_is_no_cycle() -> None:
     # Its period would be whatever the guess is.
-    center = fl.System(lambda t, x: [x[1], -x[0]], n=2)
-    with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
-        fl.limit_cycle(center, [1.0, 0.3], period=6.0, transient=0)
+    for damping in (-0.1, 0.0, 0.1, 0.5):
+        focus = fl.System(lambda t, x, c=damping: [x[1], -x[0] - c * x[1]], n=2)
+        with pytest.raises(fl.ModelError, match="leads to an equilibrium"):
+            fl.limit_cycle(focus, [1.0, 0.0], period=6.0, transient=0)
+        if damping:
+            with pytest.raises(fl.ModelError, match="Newton's method"):
+                fl.limit_cycle(focus, [1.0, 0.3], period=6.0, transient=0)
+
+
+@pytest.mark.parametrize("start", [[1.0, 0.3], [0.2, -3.0]])
+def test_one_of_a_family_of_cycles(start: list[float]) -> None:
+    center = fl.System(lambda t, x: [x[1], -4 * x[0]], n=2)
+    for guess in (2.5, 3.0, 3.3):
+        cycle = fl.limit_cycle(center, start, period=guess, transient=0)
+        assert abs(cycle.period - np.pi) < 1e-12
+        assert np.max(np.abs(cycle.y0)) > 1e-3
+
+
+def test_a_guess_far_from_unstable_cycles() -> None:
+    # Where the itinerary of the guess is not that of a cycle, Newton's method on the flow comes nearer.
+    def duffing(t: float, x: Any, c: float = 0.05, F: float = 0.2) -> list[Any]:
+        return [x[1], x[0] - x[0] ** 3 - 0.2 * x[1] + F * np.cos(t) - c * np.sign(x[1])]
+
+    system = fl.System(duffing, n=2)
+    found = []
+    for c, force, start in (
+        (0.05, 0.3, [-0.15, -0.1]),
+        (0.02, 0.2, [0.05, 0.1]),
+        (0.05, 0.2, [-0.1, 0.0]),
+        (0.0, 0.25, [-0.2, 0.1]),
+        (0.1, 0.3, [0.05, 0.1]),
+    ):
+        params = {"c": c, "F": force}
+        cycle = fl.limit_cycle(system, start, params, period=2 * np.pi, transient=0)
+        assert cycle.is_admissible
+        run = system.solve((0, 2 * np.pi), cycle.y0, params, rtol=1e-12, atol=1e-13, wrt="y0")
+        assert np.max(np.abs(run.y[:, -1] - cycle.y0)) < 1e-9
+        found.append(float(np.max(np.abs(cycle.multipliers))))
+        largest = float(np.max(np.abs(np.linalg.eigvals(run.derivative()))))
+        assert abs(found[-1] - largest) < 1e-6 * largest
+    assert max(found) > 200
+
+
+def test_a_cycle_from_another_time_has_the_same_pieces() -> None:
+    system = fl.System(lambda t, x: [x[1], -x[0] - 0.4 * np.sign(x[1]) + np.cos(t / 3)], n=2)
+    cycle = fl.limit_cycle(system, [1.0, 2.0], period=6 * np.pi)
+    own = cycle.itinerary
+    for t in (0.1, 2.0, 7.5, 18.0):
+        turned = own.from_place(cycle.t0 + t, cycle.at(cycle.t0 + t))
+        assert abs(turned.period - cycle.period) < 1e-12
+        assert len(turned.legs) == len(own.legs) + (0 if own.legs[-1].ending is None else 1)
+        back = turned.from_place(cycle.t0 + cycle.period, cycle.y0)
+        assert back.is_same(own)
+        np.testing.assert_allclose(back.durations, own.durations, atol=1e-12)
+        np.testing.assert_allclose(np.array(back.starts), np.array(own.starts), atol=1e-9)
+        again = fl.limit_cycle(system, cycle.y0, period=6 * np.pi, t0=t)
+        np.testing.assert_allclose(again.y0, cycle.at(t), atol=1e-9)
 
 
 def test_cycles_along_which_perturbations_grow_very_much() -> None:

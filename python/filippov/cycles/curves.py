@@ -16,7 +16,7 @@ from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.codimension_two import CODIMENSION_TWO, ENDS, POLES
 from filippov.cycles.conditions import PROBES, Condition, condition_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.following import AnyCurve, bounds_of, curve_of, shrinks_to_point
+from filippov.cycles.following import AnyCurve, bounds_of, curve_of, share_to_point
 from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
@@ -223,7 +223,7 @@ class _CurveSide:
                 continue
             self.w, self.tangent = point.w, tangent
             self._keep(point, tests)
-            if shrinks_to_point([point.state for point in self.points]):
+            if share_to_point([point.state for point in self.points]) is not None:
                 self.points.pop()
                 where = self._where(self.trail[-2].w)
                 self.reason = f"the cycle shrinks to an equilibrium, a generalised Hopf point, behind {where}"

@@ -21,6 +21,7 @@ from filippov.cycles.forcing import (
     refuse_other_period,
     ticks_of,
 )
+from filippov.cycles.guess import better_guess
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
 from filippov.cycles.probes import PLACES, end_probes_of, probes_of
@@ -38,6 +39,8 @@ __all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "in_parts", "limi
 
 _MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
+# So many itineraries are tried, each from a run beside the cycle that the one before leads to.
+_MOST_ITINERARIES = 5
 # The first run of a search is that short: how fast a system is shows in its steps.
 _SHORTEST_SPAN = 4.0**-15
 _SINGULAR, _ROUNDING = 1e-12, 1e-9
@@ -499,18 +502,37 @@ def cycle_at(
     ModelError
         If the run has no itinerary, or Newton's method does not converge.
     """
-    itinerary = None
-    if not is_free:
-        record = motions.record((t0, t0 + 2.05 * duration), x)
-        itinerary = itinerary_from_event(record, duration)
-    if itinerary is None:
-        record = motions.record((t0, t0 + 1.02 * duration), x)
-        itinerary = itinerary_of(record, t0, t0 + duration)
-    found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
-    if abs(found.period - duration) > 0.5 * duration:
-        raise ModelError(
-            f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}"
-        )
+    try:
+        return _cycle_beside(motions, t0, x, duration, period, is_free)
+    except ModelError:
+        better = None if is_free else better_guess(motions, t0, x, duration, period is not None)
+        if better is None:
+            raise
+    return _cycle_beside(motions, t0, *better, period, is_free)
+
+
+def _cycle_beside(
+    motions: Motions, t0: float, x: Array, duration: float, period: Period, is_free: bool
+) -> Cycle:
+    found = None
+    for _ in range(_MOST_ITINERARIES):
+        itinerary = None
+        if not is_free:
+            record = motions.record((t0, t0 + 2.05 * duration), x)
+            itinerary = itinerary_from_event(record, duration)
+        if itinerary is None:
+            record = motions.record((t0, t0 + 1.02 * duration), x)
+            itinerary = itinerary_of(record, t0, t0 + duration)
+        found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
+        if abs(found.period - duration) > 0.5 * duration:
+            raise ModelError(
+                f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}"
+            )
+        if is_free or found.is_admissible:
+            break
+        # The flow takes other pieces there.
+        t0, x = found.inside()
+    assert found is not None
     return found
 
 
@@ -702,7 +724,8 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
         t, end = _last_inside(solution)
         size = np.max(np.abs(solution.y), axis=1) + 1e-300
-        if np.max(np.abs(end) / (1e-300 + np.max(np.abs(x)) + 1.0)) > 1e8:
+        is_large = np.max(np.abs(end)) > 1e8 * (np.max(np.abs(x)) + 1.0)
+        if is_large and _grows(solution):
             raise ModelError(
                 f"no cycle was found: the run grows without bound, to {_short(end)} at t = {t:.6g}"
             )
@@ -717,7 +740,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 f"no cycle was found: the run comes to rest at {_short(solution.y[:, -1])}; fl.equilibrium "
                 "finds where"
             )
-        returns = motions.run((t, t + span), point, events=Event(_plane(at, point), direction=1))
+        returns = motions.run((t, t + span), point, events=Event(_plane(at / size**2, point), direction=1))
         times, points = _first_event(returns)
         later_ones = times > t + 1e-9 * span
         times, points = times[later_ones], points[later_ones]
@@ -752,6 +775,12 @@ def _first_event(run: Solution) -> tuple[Array, Array]:
     assert run.t_events is not None
     assert run.y_events is not None
     return run.t_events[0], run.y_events[0]
+
+
+def _grows(run: Solution) -> bool:
+    """Whether a state is larger in the last quarter of a run than ever before."""
+    late = run.t > run.t[-1] - 0.25 * (run.t[-1] - run.t[0])
+    return bool(np.any(np.max(np.abs(run.y[:, late]), axis=1) > np.max(np.abs(run.y[:, ~late]), axis=1)))
 
 
 def _last_inside(run: Solution) -> tuple[float, Array]:
@@ -806,22 +835,19 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     if section is None and not is_timed:
         return cycle
     t, x = cycle.inside()
-    if is_timed:
+    if is_timed and _counts_time(cycle.itinerary):
         turns = np.ceil((t - t0) / period - 1e-9)
-        if _counts_time(cycle.itinerary):
-            start = cycle.at(t0 + turns * period, before=True)
-            return cycle_at(motions, t0, start, period, forcing, is_free=True)
-        record = motions.record((t, t + 2.3 * period), x)
-        at = t0 + float(turns) * period
-        return cycle_of(motions, itinerary_of(record, at, at + period).from_time(t0), forcing)
+        start = cycle.at(t0 + turns * period, before=True)
+        return cycle_at(motions, t0, start, period, forcing, is_free=True)
+    if is_timed:
+        at = cycle.t0 + (t0 - cycle.t0) % period
+        return cycle_of(motions, cycle.itinerary.from_place(at, cycle.at(at)).from_time(t0), forcing)
     assert isinstance(section, Event)
     times, _ = _first_event(motions.run((t, t + 1.05 * period), x, events=section))
     if not len(times):
         raise ModelError(f"section: the cycle does not reach {section.name or 'it'}")
-    # At a switch the cycle starts behind it.
-    record, at = motions.record((t, t + 3.2 * period), x), float(times[0])
-    itinerary = itinerary_from_event(record, period, at=at)
-    moved = cycle_of(motions, itinerary or itinerary_of(record, at, at + period), forcing)
+    at = cycle.t0 + (float(times[0]) - cycle.t0) % period
+    moved = cycle_of(motions, cycle.itinerary.from_place(at, cycle.at(at)), forcing)
     moved._section = section.g
     return moved
 

@@ -38,7 +38,7 @@ from filippov.errors import InputError, ModelError
 from filippov.progress import BranchBar
 from filippov.scalars import count, positive
 
-__all__ = ["at_value", "bounds_of", "continuation", "curve_of", "shrinks_to_point"]
+__all__ = ["at_value", "bounds_of", "continuation", "curve_of", "share_to_point"]
 
 AnyCurve = CycleCurve | EquilibriumCurve
 
@@ -62,6 +62,8 @@ _LEAST = 1e-300
 _TENFOLDS, _STANDS = 4, 1e-8
 # A cycle whose size is such a part of that of the first one is an equilibrium.
 _SHRUNK = 1e-6
+# How near a branch comes to where a cycle has shrunk to a point, as a share of the way.
+_NEARLY = 0.98
 # How far, by its size, a cycle is another one.
 _JUMPS = 0.2
 _NO_DURATION, _VANISHES = 1e-13, 1e-9
@@ -504,16 +506,30 @@ class _Side:
     def _vanishes(self) -> bool:
         """Whether a cycle has shrunk to an equilibrium, where its branch ends."""
         states = [point.state for point in self.points]
-        if not shrinks_to_point(states) and not self._has_shrunk(states[-1]):
+        share = share_to_point(states)
+        if share is None and not self._has_shrunk(states[-1]):
             return False
         self.points.pop()
-        value = self.points[-1].params[self.settings.name]
         # Its multiplier is 1 there, and the branch comes back inside out: that is no fold.
         self.special = [
             s for s in self.special if s.code not in ("LP", "BP") or s.point < len(self.points) - 1
         ]
+        if share is not None and self.earlier:
+            self._come_near(share)
+        value = self.points[-1].params[self.settings.name]
         self.reason = f"the cycle shrinks to an equilibrium behind {self.settings.name} = {value:.6g}"
         return True
+
+    def _come_near(self, share: float) -> None:
+        """Take a last point next to that where the cycle is a point, at a share of the last step."""
+        behind, before = self.here, self.earlier[0]
+        before.curve.refer_to(before.place.w)
+        s = _NEARLY * share * _along(before.place, behind.place)
+        try:
+            step, position = self._beside(before, s, behind.place)
+            self._go_on(position, before.curve.state(step.w, step.error))
+        except ModelError:
+            return
 
     def _has_shrunk(self, state: State) -> bool:
         """Whether a cycle is a point beside the first one of the branch, as at a boundary equilibrium."""
@@ -1039,22 +1055,25 @@ def _summary(curve: AnyCurve, place: Place) -> Array:
     return np.concatenate([tangent[:n], [np.sum(tangent[m * n : m * (n + 1)])], tangent[-1:]])
 
 
-def shrinks_to_point(states: Sequence[State]) -> bool:
-    """Whether the last of the states along a curve, cycles without switches, lie around a cycle of no size.
+def share_to_point(states: Sequence[State]) -> float | None:
+    """Return at which share of the last step a cycle without switches has no size; None if it keeps some.
 
     Behind it the curve comes back with cycles turned inside out.
     """
     if len(states) < 2:
-        return False
+        return None
     first, spans = states[0], []
     for state in (states[-1], states[-2], first):
         if not isinstance(state, Cycle) or state.is_forced:
-            return False
+            return None
         if state is not first and len(state.itinerary.legs) > 1:
-            return False
+            return None
         spans.append(state.at(state.t0 + 0.5 * state.period) - state.y0)
-    last, before, own = spans
-    return bool(last @ before <= 0 or np.linalg.norm(last) <= 1e-3 * float(np.linalg.norm(own)))
+    last, before = spans[:2]
+    sizes = [float(np.linalg.norm(span)) for span in spans]
+    if last @ before <= 0:
+        return sizes[1] / (sizes[0] + sizes[1])
+    return 1.0 if sizes[0] <= 1e-3 * sizes[2] else None
 
 
 def _extent(cycle: Cycle) -> float:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from filippov.cycles.motions import Array, Guard, Instant, Mode, Record
 from filippov.errors import ModelError
 
 __all__ = ["MOST_LEGS", "Ending", "Itinerary", "Leg", "itinerary_from_event", "itinerary_of"]
 
 MOST_LEGS = 400
+# Times nearer than such a part of the period are the same.
+_ROUNDING = 1e-8
 
 
 class Ending(NamedTuple):
@@ -90,14 +94,38 @@ class Itinerary(NamedTuple):
 
     def from_time(self, t0: float) -> Itinerary:
         """Return the itinerary from another time: of a system without forcing, or moved by periods of it."""
-        shift = t0 - self.t0
-        legs = [
-            leg
-            if leg.ending is None
-            else leg._replace(ending=leg.ending._replace(time=leg.ending.time + shift))
-            for leg in self.legs
-        ]
+        legs = [_later(leg, t0 - self.t0) for leg in self.legs]
         return self._replace(legs=tuple(legs), t0=t0)
+
+    def from_place(self, t: float, x: Array) -> Itinerary:
+        """Return the same cycle from a time within it, at which the state is `x`.
+
+        If something happens at this time, the cycle starts behind it.
+        """
+        end = Ending(None, self.t0 + self.period, cuts=True)
+        last = self.legs[-1] if self.is_closed_by_event() else self.legs[-1]._replace(ending=end)
+        legs, starts, durations = [*self.legs[:-1], last], list(self.starts), list(self.durations)
+        times = (self.t0 + np.concatenate([[0.0], np.cumsum(durations)])).tolist()
+        near = int(np.argmin(np.abs(np.array(times) - t)))
+        if abs(times[near] - t) <= _ROUNDING * self.period:
+            k = near % len(legs)
+        else:
+            k = int(np.searchsorted(times, t))
+            before, behind = legs[k - 1]._replace(ending=end._replace(time=t)), legs[k - 1]
+            legs[k - 1 : k], starts[k:k] = [before, behind], [x]
+            durations[k - 1 : k] = [t - times[k - 1], times[k] - t]
+            times[k:k] = [t]
+        later = [_later(leg, self.period) for leg in legs[:k]]
+        turned = Itinerary(
+            (*legs[k:], *later), times[k], (*starts[k:], *starts[:k]), (*durations[k:], *durations[:k])
+        ).merged()
+        # Nothing happens where it ends if it goes on there.
+        closing = turned.legs[-1]
+        return (
+            turned._replace(legs=(*turned.legs[:-1], closing._replace(ending=None)))
+            if closing.is_cut
+            else turned
+        )
 
     def has_events(self) -> bool:
         """Whether a leg ends at an event."""
@@ -144,6 +172,13 @@ class Itinerary(NamedTuple):
         if len(own) != len(theirs):
             return False
         return any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
+
+
+def _later(leg: Leg, shift: float) -> Leg:
+    """Return a leg that ends later by some time."""
+    if leg.ending is None:
+        return leg
+    return leg._replace(ending=leg.ending._replace(time=leg.ending.time + shift))
 
 
 def _signature(leg: Leg) -> tuple[object, ...]:

@@ -31,6 +31,8 @@ _GROWTH, _GROWTH_OF_PARTS = 1e3, 30.0
 # shorter one where the equations hold to rounding.
 _ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
 _SOLVED = 1e-11
+# No symmetry of a cycle brings a state back to its value at the start at both of these shares of a leg.
+_SHARES = (0.236068, 0.5)
 # A leg that vanishes may last for less than nothing by rounding.
 _NOTHING = 1e-11
 # A state that is such a part of the largest one is at zero.
@@ -176,34 +178,41 @@ class Shooting:
         self.is_free_in_time = period is not None and itinerary.is_closed_by_event()
         self.n, self.m = motions.n, len(self.legs)
         self._guess = itinerary
-        self.refer_to(itinerary.starts[0])
         # The parts of a divided motion keep their shares of it.
         durations = itinerary.durations
         self._shares = [
             durations[i] / durations[i + 1] if leg.is_cut else np.nan for i, leg in enumerate(self.legs)
         ]
+        self.refer_to(self.unknowns(itinerary))
 
     @cached_property
     def swing(self) -> Array:
-        """The largest change of each state from the start to the middle of a leg in the guess, (n,)."""
-        t, found = self._guess.t0, np.zeros(self.n)
-        for leg, x, duration in zip(self.legs, self._guess.starts, self._guess.durations, strict=True):
-            middle = self.motions.leg(leg.mode, leg.discrete, t, x, 0.5 * duration)
-            found = np.maximum(found, np.abs(middle - x))
+        """The largest change of each state along a leg in the guess, (n,)."""
+        return self._swing_at(self.unknowns(self._guess))
+
+    def _swing_at(self, u: Array) -> Array:
+        starts, durations, t = self.parts(u)
+        found = np.zeros(self.n)
+        for leg, x, duration in zip(self.legs, starts, durations, strict=True):
+            for share in _SHARES:
+                inside = self.motions.leg(leg.mode, leg.discrete, t, x, share * duration)
+                found = np.maximum(found, np.abs(inside - x))
             t += duration
         return np.where(np.isfinite(found), found, 0.0)
 
     def refer_to(self, u: Array) -> None:
-        """Fix the phase of a cycle that starts at no event beside another one; `u` may be its start alone."""
+        """Fix the phase of a cycle that starts at no event beside another one."""
         if self.period is not None or self.legs[-1].ending is not None:
             return
         first = self.legs[0]
         self._reference = u[: self.n].copy()
-        self._along = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+        velocity = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+        # Across the velocity, each state measured by its changes: in all units of states and of time.
+        self._normal = velocity / np.maximum(self._swing_at(u), _AT_ZERO * scales(self, u)[: self.n]) ** 2
 
     def plane(self) -> Array | None:
         """Return the normal of the plane in which a cycle starts that starts at no event."""
-        return None if self.period is not None or self.legs[-1].ending is not None else self._along
+        return None if self.period is not None or self.legs[-1].ending is not None else self._normal
 
     @property
     def size(self) -> int:
