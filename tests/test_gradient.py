@@ -5,12 +5,14 @@ Reference: Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import filippov as fl
 import numpy as np
 import pytest
 from fuzz.systems import build, random_case
+from scipy.interpolate import CubicSpline
 
 METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
 TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-12}
@@ -327,3 +329,63 @@ def test_second_derivatives_between_steps_where_some_are_not_known() -> None:
         sol = system.solve((0, 10), [0.0, 0.2], wrt=["y0", "F"], order=2)
     for t in (7.0, 8.5, 9.99, 10.0):
         assert sol.derivative(t, order=2)[0, 2, 2] == pytest.approx(-5 * np.sin(t - 5), abs=1e-5)
+
+
+def _filled(t: Any, x: Any) -> Any:
+    d = np.zeros(2)
+    d[0], d[1] = x[0] - 0.3, x[1]
+    return d[0] + 0.2 * d[1]
+
+
+_LIST = [0.1, 0.3, 0.2, 0.4]
+_SPLINE = CubicSpline([0, 1, 2, 3], [0.2, 0.1, 0.3, 0.2])
+SPELLINGS: dict[str, Any] = {
+    "filled": _filled,
+    "math": lambda t, x: math.sin(x[0]) - 0.3,
+    "whole": lambda t, x: x[0] - 0.1 * int(t),
+    "float": lambda t, x: float(x[0]) - 0.2,
+    "list": lambda t, x: x[0] - _LIST[int(t)],
+    "spline": lambda t, x: x[0] - _SPLINE(t),
+}
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_costs_in_any_spelling(name: str) -> None:
+    """The functions of the package around those of the user hid them from the second look at names."""
+
+    def spring(t: float, x: Any, k: float = 1.0) -> Any:
+        d = np.zeros(2)
+        d[0], d[1] = x[1], -k * x[0] - 0.3 * np.sign(x[1] - 0.2)
+        return d
+
+    cost, system = SPELLINGS[name], fl.System(spring, n=2)
+    for options in ({"terminal": cost}, {"running": cost}, {"instants": [([1.2, 1.7], cost)]}):
+
+        def value(values: dict[str, float], options: Any = options) -> float:
+            found = fl.gradient(system, (0, 2.5), [1.0, 0.0], values, wrt=["k"], **options, **TIGHT)
+            return float(found[0])
+
+        _, slope = fl.gradient(system, (0, 2.5), [1.0, 0.0], wrt=["k"], **options, **TIGHT)
+        assert slope["k"] == pytest.approx(by_differences(value, {"k": 1.0})["k"], abs=1e-7)
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_events_and_resets_that_do_not_name_a_parameter(name: str) -> None:
+    cost = SPELLINGS[name]
+
+    def naming(t: float, x: Any, k: float) -> Any:
+        return k * cost(t, x)
+
+    system = fl.System(lambda t, x, k=1.0: [x[1], -k * x[0]], n=2)
+    found = [system.solve((0, 2.5), [1.0, 0.0], events=g, **TIGHT).t_events for g in (cost, naming)]
+    assert found[0] is not None
+    assert found[1] is not None
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
+    ends = []
+    for g in (cost, naming):
+        reset = fl.Reset(g, lambda t, x: [x[0], 0.5 + _filled(t, x)], direction="down")
+        body = fl.System(lambda t, x, k=1.0: [x[1], -k * x[0]], n=2, resets=reset)
+        sol = body.solve((0, 2.5), [1.0, 0.0], wrt=["k"], **TIGHT)
+        assert "reset" in sol.switches.kind
+        ends.append(np.append(sol.y[:, -1], sol.derivative()))
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-10)

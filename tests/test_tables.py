@@ -249,3 +249,24 @@ def test_a_list_at_places_among_bins_that_repeat() -> None:
     values = np.array([10.0, 20.0, 30.0, 40.0])
     system = fl.System(lambda t, x: [values[np.digitize(t, [1.0, 1.0, 2.0])]], n=1)
     assert system.solve((0.0, 3.0), [0.0]).y[0, -1] == pytest.approx(10.0 + 30.0 + 40.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("knots", [[-1, 0, 0.3, 1], [-2, 0, 0.25, 1], [-0.3, 0, 1], [-1, -0.3, 0, 1]])
+def test_a_knot_at_zero_is_passed_like_any_other(knots: list[float]) -> None:
+    # Projected onto such a knot a state is 1e-300, which pieces of other widths saw on other sides.
+    values = np.sin(3 * np.array(knots))
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        y0, shift = random.normal(size=2), np.array([2.0, 0.0])
+        ends = [
+            run(
+                lambda t, x, d=d: [
+                    x[1],
+                    -np.interp(x[0], np.array(knots) + d, values) - 0.5 * (x[0] - d) - 0.1 * x[1],
+                ],
+                10.0,
+                (y0 + 0.5 * d * shift).tolist(),
+            ).y[:, -1]
+            for d in (0.0, 2.0)
+        ]
+        np.testing.assert_allclose(ends[1] - shift, ends[0], atol=1e-7)

@@ -132,3 +132,35 @@ def test_derivatives_of_a_run_that_was_meant_to_be_long() -> None:
     known = system.solve((0, 14), [1.0, 2.0], wrt="all").derivative()
     found = system.solve((0, 1e8), [1.0, 2.0], wrt="all", events=stop).derivative()
     np.testing.assert_allclose(found, known, rtol=1e-6)
+
+
+@pytest.mark.parametrize("slope", [1.0, 0.7, 3.0])
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1.0, 1e3])
+def test_a_root_of_the_distance_in_small_units(unit: float, slope: float) -> None:
+    """Behind a crossing the field of the other side was taken too far from the surface."""
+
+    def twisting(t: float, x: Any, unit: float = unit, slope: float = slope) -> Any:
+        h = slope * x[0]
+        return [
+            x[1] - 1.5 * np.sqrt(unit / slope) * abs(h) ** 0.5 * np.sign(h),
+            unit * (-1.1 * np.sign(h) + 0.5 * np.cos(t)),
+        ]
+
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        start, end = random.uniform(-1, 1, 2), random.uniform(0.5, 8)
+        sol = fl.solve_ivp(twisting, (0, end), unit * start, atol=1e-9 * unit)
+        assert sol.success, sol.message
+        known = fl.solve_ivp(twisting, (0, end), start, args=(1.0, 1.0), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(sol.y[:, -1] / unit, known.y[:, -1], atol=2e-5)
+
+
+@pytest.mark.parametrize("unit", [1e-12, 3.0, 3.0e7, 312989393.57, 5440654851.69])
+def test_sliding_on_a_level_where_another_sign_changes(unit: float) -> None:
+    def levels(t: float, x: Any) -> Any:
+        return [unit * (0.7 - np.floor(x[0] / unit) - 0.2 * np.sign(x[1])), unit * 0.3 * np.sin(t)]
+
+    sol = fl.solve_ivp(levels, (0, 9), [3.6 * unit, -0.2 * unit], atol=1e-9 * unit)
+    assert sol.success, sol.message
+    # The second state is -0.2 + 0.3 (1 - cos t).
+    np.testing.assert_allclose(sol.y[:, -1] / unit, [1.0, 0.1 - 0.3 * np.cos(9)], atol=1e-6)

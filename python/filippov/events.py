@@ -15,6 +15,8 @@ from filippov.errors import InputError
 __all__ = ["Event", "EventSpec", "normalise_events"]
 
 _DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
+# The mark of `calls_user`.
+CALLS_USER = "calls_user"
 # Attributes of a function that `inspect.signature` heeds.
 _OTHER_SIGNATURES = {"__wrapped__", "__signature__"}
 
@@ -134,7 +136,18 @@ def selective(function: Callable[..., Any], values: dict[str, float]) -> Callabl
     named = accepted_names(function, values)
     if len(named) == len(values):
         return function
-    return lambda t, x, *args, **params: function(t, x, *args, **{name: params[name] for name in named})
+
+    @calls_user
+    def own(t: Any, x: Any, *args: Any, **params: Any) -> Any:
+        return function(t, x, *args, **{name: params[name] for name in named})
+
+    return own
+
+
+def calls_user(wrapper: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark a function of the package that calls one of the user: a trace reads it like one of the user."""
+    vars(wrapper)[CALLS_USER] = True
+    return wrapper
 
 
 def raised_by(error: BaseException, functions: Iterable[tuple[str, Any]]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from functools import partial
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -20,6 +21,7 @@ from filippov.events import (
     accepted_names,
     bind_function,
     call_once,
+    calls_user,
     check_scalar,
     normalise_events,
     selective,
@@ -269,25 +271,37 @@ def _named(function: Cost, params: Mapping[str, Any]) -> dict[str, Any]:
     return {name: params[name] for name in accepted_names(function, params)}
 
 
+def _names_of(function: Cost) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Return what takes those parameters that a function names; a stand-in for it later takes the same."""
+    named = partial(accepted_names, function)
+    return lambda params: {name: params[name] for name in named(params)}
+
+
 def _of_first(event: Event, n: int) -> Event:
     """Return an event as a function of a state that begins with `n` components of its own."""
-
-    def g(t: Any, y: Any, **params: Any) -> Any:
-        return event.g(t, y[:n], **_named(event.g, params))
-
-    return Event(g, event.direction, event.terminal, event.name)
+    return Event(_cost_of_first(event.g, n), event.direction, event.terminal, event.name)
 
 
 def _cost_of_first(cost: Cost, n: int) -> Cost:
     """Return a cost as a function of a state that begins with `n` components of its own."""
-    return lambda t, y, **params: cost(t, y[:n], **_named(cost, params))
+    named = _names_of(cost)
+
+    @calls_user
+    def own(t: Any, y: Any, *args: Any, **params: Any) -> Any:
+        return cost(t, y[:n], *args, **named(params))
+
+    return own
 
 
 def _with_integral(terminal: Cost | None, n: int) -> Cost:
     """Return the cost at the end with the integral of the running cost, which is state `n`."""
+    if terminal is None:
+        return lambda t, y: y[n]
+    own = _cost_of_first(terminal, n)
 
+    @calls_user
     def final(t: Any, y: Any, **params: Any) -> Any:
-        return y[n] if terminal is None else terminal(t, y[:n], **_named(terminal, params)) + y[n]
+        return own(t, y, **params) + y[n]
 
     return final
 
@@ -304,19 +318,22 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
     if source is None:
         raise InputError("running: the function of a system that was read from a file is not known")
 
+    rates_of, rate_of = source.fun, _cost_of_first(running, n)
+
+    @calls_user
     def fun(t: Any, x: Any, *args: Any, **params: Any) -> list[Any]:
-        rates = np.ravel(np.asarray(source.fun(t, x[:n], *args, **params), dtype=object))
-        rate = running(t, x[:n], **_named(running, params))
+        rates = np.ravel(np.asarray(rates_of(t, x[:n], *args, **params), dtype=object))
+        rate = rate_of(t, x, **params)
         if np.ndim(rate):
             check_scalar(rate, "running", in_array=False)
         return [*rates, rate]
 
-    def before(function: Cost) -> Cost:
-        return lambda t, x, *args, **params: function(t, x[:n], *args, **_named(function, params))
-
     def after(map_: Cost) -> Cost:
+        own = _cost_of_first(map_, n)
+
+        @calls_user
         def change(t: Any, x: Any, *args: Any, **params: Any) -> list[Any]:
-            moved = map_(t, x[:n], *args, **_named(map_, params))
+            moved = own(t, x, *args, **params)
             return [*np.ravel(np.asarray(moved, dtype=object)), x[n]]
 
         return change
@@ -324,12 +341,14 @@ def _with_running_cost(system: System, running: Cost, n: int) -> System:
     def reset_of(reset: Reset) -> Reset:
         new = copy(reset)
         new.map = None if reset.map is None else after(reset.map)
-        new.h = None if reset.h is None else before(reset.h)
-        new.set = {name: before(value) if callable(value) else value for name, value in reset.set.items()}
+        new.h = None if reset.h is None else _cost_of_first(reset.h, n)
+        new.set = {
+            name: _cost_of_first(value, n) if callable(value) else value for name, value in reset.set.items()
+        }
         return new
 
     resets = tuple(reset_of(reset) for reset in source.resets)
-    surfaces = tuple(before(surface) for surface in source.surfaces)
+    surfaces = tuple(_cost_of_first(surface, n) for surface in source.surfaces)
     extended = System._from_source(
         Source(
             fun, surfaces, source.args, black_box=source.black_box, resets=resets, discrete=source.discrete
@@ -371,7 +390,8 @@ class _Sum:
         held = self._run.discrete(np.array([t]), len(self._names), False)[:, 0] if self._names else ()
         self._at_end.append(self._value_of((name, cost), t, y, held))
         known = None if zero is None else self._trace(name, zero)
-        self._terms.append((self._trace(name, cost), None, None, known))
+        function = self._trace(name, cost, None if zero is not None else float(t))
+        self._terms.append((function, None, None, known))
         self._costs.append((name, cost))
 
     def add_at_surface(self, name: str, cost: Cost, surface: str) -> None:
@@ -432,7 +452,12 @@ class _Sum:
         found = known or trace_output(trace, own)
         self._traced[function] = found
         if isinstance(found, str) and known_time is not None:
-            there = trace_output(trace, lambda t, y, **params: own(known_time, y, **params))
+
+            @calls_user
+            def at_time(t: Any, y: Any, **params: Any) -> Any:
+                return own(known_time, y, **params)
+
+            there = trace_output(trace, at_time)
             if isinstance(there, TracedSystem):
                 return there
         if isinstance(found, str):

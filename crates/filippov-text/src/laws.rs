@@ -488,13 +488,13 @@ impl Laws {
             .windows(2)
             .map(|pair| 1.0 / (pair[1] - pair[0]))
             .collect();
-        let [first, last] = match rates[..] {
-            [] => [1.0, 1.0],
-            [first, .., last] => [first, last],
-            [only] => [only, only],
+        // The slopes at a knot are the same from both pieces: what is rounding on one side is so on the other.
+        let slope = match knots {
+            [first, .., last] => rates.len() as f64 / (last - first),
+            _ => 1.0,
         };
-        let above = [&[first], &rates[..]].concat();
-        let below = [&rates[..], &[last]].concat();
+        let above = [&[slope], &rates[..]].concat();
+        let below = vec![slope; knots.len()];
         let mut distance = |rates: Vec<f64>, ends: Vec<f64>| {
             let rate = Laws::entry(tracer, piece, rates, 0.0, "");
             let end = Laws::entry(tracer, piece, ends, 0.0, "");

@@ -415,9 +415,10 @@ class Laws:
         """Return what is positive between the knots around an expression, and zero at them."""
         builder = tracer.builder
         (node,), knots = law.nodes, np.array(law.numbers)
+        # The slopes at a knot are the same from both pieces: what is rounding on one side is so on the other.
         rates = 1.0 / np.diff(knots)
-        ends = rates[[0, -1]] if len(rates) else np.ones(2)
-        above, below = np.insert(rates, 0, ends[0]), np.append(rates, ends[1])
+        slope = float(1.0 / np.mean(np.diff(knots))) if len(rates) else 1.0
+        below, above = np.full(len(knots), slope), np.insert(rates, 0, slope)
 
         def distance(rates: NDArray[Any], ends: NDArray[Any]) -> int:
             rate, end = (self.entry(tracer, piece, tuple(values.tolist())) for values in (rates, ends))

@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from filippov.events import CALLS_USER
 from filippov.trace.array import NumberTable, TracedArray, at_index, plain, wrap
 from filippov.trace.condition import Condition
 from filippov.trace.explain import NUMPY_NAMES, is_foreign
@@ -85,7 +86,8 @@ class StandIns:
 
     def _function(self, function: FunctionType, _: str) -> Any:
         code = function.__code__
-        if is_foreign(code.co_filename) or _assigns_outside(code):
+        is_of_package = is_foreign(code.co_filename) and CALLS_USER not in vars(function)
+        if is_of_package or _assigns_outside(code):
             return function
         cells = tuple(CellType() for _ in function.__closure__ or ())
         names: dict[str, Any] = {"__builtins__": {**vars(builtins), "__import__": self._import}}

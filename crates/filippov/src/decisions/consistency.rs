@@ -259,16 +259,23 @@ pub(crate) fn differs_between_sides(
     if !(1..=MOST_MEETING).contains(&sliding.len()) {
         return Ok(None);
     }
-    let mut h = vec![0.0; mode.entries().len()];
-    for pattern in 0..1_usize << sliding.len() {
+    let (n, patterns) = (mode.entries().len(), 1_usize << sliding.len());
+    let mut values = vec![0.0; n * patterns];
+    for (pattern, h) in values.chunks_exact_mut(n).enumerate() {
+        let signs = mode.on_sides(sliding, pattern).signs();
+        system.surfaces(&Setting::new(&signs, &motion.discrete).at(t, x), h)?;
+    }
+    for pattern in 0..patterns {
         let side = mode.on_sides(sliding, pattern);
         let signs = side.signs();
         let place = Setting::new(&signs, &motion.discrete).at(t, x);
-        system.surfaces(&place, &mut h)?;
-        for k in (0..h.len()).filter(|k| !sliding.contains(k) && is_checked(*k)) {
-            let beyond = -h[k] * f64::from(side.entries()[k]);
+        for k in (0..n).filter(|k| !sliding.contains(k) && is_checked(*k)) {
+            let h = |pattern: usize| values[n * pattern + k];
+            let beyond = -h(pattern) * f64::from(side.entries()[k]);
             let size = system.surface_size(k, &place)?;
-            if beyond > DOUBTFUL * (1.0 + size) {
+            // What is beyond on all sides is so by the rounding of its event.
+            let differs = |other: usize| (h(other) - h(pattern)).abs() > DOUBTFUL * beyond;
+            if beyond > DOUBTFUL * (1.0 + size) && (0..patterns).any(differs) {
                 return Ok(Some(Stop::SlidesAcrossJump {
                     surfaces: sliding.to_vec(),
                     jumping: vec![k],

@@ -24,7 +24,7 @@ use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, Warning, WarningCode};
 use crate::switch::{Kind, Switch};
-use crate::system::{eval_on_side, ActionMap, Trigger};
+use crate::system::{eval_on_side_in, ActionMap, Trigger};
 use crate::tolerances::{DOUBTFUL, FEW_SWITCHES, MOST_SWITCHES_AT_ONE_TIME};
 use smallvec::SmallVec;
 
@@ -511,7 +511,8 @@ impl<'a> Integrator<'a> {
         } else if let ModeField::Region(_) = &run.motion.field {
             let place = run.motion.setting().at(run.t, &run.x);
             let derivative = self.stepper.start_derivative_mut();
-            run.stats.n_field_evaluations += eval_on_side(run.system, &place, derivative)?;
+            let unit = Units::size_meant(run.options);
+            run.stats.n_field_evaluations += eval_on_side_in(run.system, &place, unit, derivative)?;
         } else {
             let derivative = self.stepper.start_derivative_mut();
             run.motion.field.eval(run.t, &mut run.x, derivative)?;

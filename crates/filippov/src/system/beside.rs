@@ -93,8 +93,15 @@ fn moved_off<S: PiecewiseSystem + ?Sized>(
 
 /// The offsets to try, from a few units of rounding of the state upwards.
 pub fn side_offsets(x: &[f64]) -> impl Iterator<Item = f64> {
+    offsets_from(x, 1.0)
+}
+
+/// The same for states in this unit; those of states of size 1 are tried last.
+fn offsets_from(x: &[f64], unit: f64) -> impl Iterator<Item = f64> {
     let size = size_of(x);
-    (0..6).map(move |k| SIDE_OFFSET * EPS * size * 16_f64.powi(k))
+    let least = x.iter().fold(unit.min(1.0), |m, v| m.max(v.abs()));
+    let finer = ((size / least).log2() / 4.0).ceil() as i32;
+    (-finer..6).map(move |k| SIDE_OFFSET * EPS * size * 16_f64.powi(k))
 }
 
 fn size_of(x: &[f64]) -> f64 {
@@ -114,11 +121,24 @@ pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
     place: &Place<'_>,
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
+    eval_on_side_in(system, place, 1.0, dx)
+}
+
+/// The same for states in this unit: a small state may be so in the units of the user only.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn eval_on_side_in<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    place: &Place<'_>,
+    unit: f64,
+    dx: &mut [f64],
+) -> Result<u64, FieldError> {
     system.field(place, dx)?;
     if dx.iter().all(|v| v.is_finite()) {
         return Ok(1);
     }
-    Ok(1 + eval_off_surface(system, place, dx)?)
+    Ok(1 + eval_at_offsets(system, place, offsets_from(place.x, unit), dx)?)
 }
 
 /// As [`eval_on_side`], for a field known not to exist on its surface: moves the point first.
@@ -130,8 +150,17 @@ pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
     place: &Place<'_>,
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
+    eval_at_offsets(system, place, side_offsets(place.x), dx)
+}
+
+fn eval_at_offsets<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    place: &Place<'_>,
+    offsets: impl Iterator<Item = f64>,
+    dx: &mut [f64],
+) -> Result<u64, FieldError> {
     let mut evaluations = 0;
-    for offset in side_offsets(place.x) {
+    for offset in offsets {
         let (t, inside) = move_inside(system, place, offset, SIDE_REACH * offset)?;
         system.field(&place.moved(t, &inside), dx)?;
         evaluations += 1;

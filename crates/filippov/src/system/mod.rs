@@ -42,7 +42,9 @@ pub(crate) use crate::vectors::{dot, dot_magnitude};
 pub use action::{Act, Action, ActionMap, Actions, Trigger};
 pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
-pub use beside::{eval_off_surface, eval_on_side, is_zero_within, move_inside, side_offsets};
+pub use beside::{
+    eval_off_surface, eval_on_side, eval_on_side_in, is_zero_within, move_inside, side_offsets,
+};
 pub use both_sides::BothSides;
 pub use clock::Clock;
 pub use closures::ClosureSystem;
