@@ -53,6 +53,8 @@ class Source(NamedTuple):
         ``"floor"`` they are zero beyond in the mode inside too, where a step looks a little further.
     beside : tuple of callable
         Events of a run that read tables or relays of their own.
+    tables_switch : bool
+        The knots of tables of the state are surfaces, instead of a law that says which piece is read.
     """
 
     fun: Callable[..., Any]
@@ -65,6 +67,7 @@ class Source(NamedTuple):
     discrete: tuple[str, ...] = ()
     root_ends: str = ""
     beside: tuple[Callable[..., Any], ...] = ()
+    tables_switch: bool = False
 
     def named_functions(self) -> list[tuple[str, Any]]:
         """Return the functions with what they are called in messages; `fun` may call others of them."""

@@ -236,7 +236,8 @@ def _key(
     read = fingerprint(source.fun, source.args, source.surfaces, resets, source.beside)
     if read is None:
         return None
-    return n, tuple(values), source.discrete, source.root_ends, states and tuple(states), read
+    ways = source.root_ends, source.tables_switch
+    return n, tuple(values), source.discrete, ways, states and tuple(states), read
 
 
 def _point(values: dict[str, float], t0: float, y0: Array) -> Hashable:
@@ -265,6 +266,7 @@ def _trace(
         discrete=source.discrete,
         root_ends=source.root_ends,
         beside=[selective(g, values) for g in source.beside],
+        tables_switch=source.tables_switch,
     )
 
 

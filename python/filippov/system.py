@@ -590,6 +590,15 @@ class System(Points, Saving):
         source = self._source._replace(beside=tuple(functions), root_ends=prepared.trace.root_ends)
         return prepare(source, len(y0), values, self._states, t0, y0)
 
+    def with_switching_tables(self) -> System | None:
+        """Return the same system with the knots of its tables as surfaces; None after unpickling."""
+        if self._source is None:
+            return None
+        source = self._source._replace(tables_switch=True)
+        new = self._from_source(source, self._n, self._params, self._states)
+        new._outputs = self._outputs
+        return new
+
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
         """Return the system with time reversed, ``s = -t``; only for systems without surfaces.
 

@@ -9,7 +9,7 @@ use filippov::{
     Rules, Setting, SignStructure,
 };
 use filippov_expr::regularized::Ramp;
-use filippov_expr::{Backend, Names};
+use filippov_expr::{Backend, Names, Regions};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -509,6 +509,12 @@ impl TracedSystem {
         let mut signs = mode.to_vec();
         signs.resize(self.system.n_surfaces(), 1.0);
         Ok(self.system.jumps_across(surface, &signs, &sliding))
+    }
+
+    /// The combinations of signs of all surfaces that points have, as far as that is known; none if there are more than `most`.
+    fn sign_combinations(&self, most: usize) -> Option<Vec<Vec<f64>>> {
+        // The values of the parameters are left open.
+        Regions::new(self.system.graph().clone(), Vec::new(), Vec::new()).combinations(most)
     }
 
     fn is_native(&self) -> bool {

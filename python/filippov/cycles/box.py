@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from filippov._core import ModeBounds, TracedSystem
 from filippov.analysis.observe import check_keywords
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.rest import Equilibrium, EquilibriumCurve, refuse_without_equilibria, rest_of
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, at_rest, refuse_without_equilibria, rest_of
 from filippov.cycles.rest_line import EquilibriumLine, is_singular, line_through
 from filippov.errors import InputError, ModelError
 from filippov.prepare import parameter_vector
@@ -122,11 +123,14 @@ def equilibria(
     Raises
     ------
     InputError
-        If an argument is wrong, or the system depends on the time, or has laws with a memory, or resets at
-        known times.
+        If an argument is wrong, or the system depends on the time, or has quantisers of its states, laws with
+        a memory, or resets at known times.
 
     Notes
     -----
+    The knots of tables of states (``np.interp``, splines, lists indexed by ``np.digitize``) are surfaces here:
+    modes have an entry for each.
+
     An equilibrium on the border of its region, or a pseudo-equilibrium at the end of its sliding segment, may
     be in the list once, twice, or not at all; where the field does not jump at the border (`kinks`), once,
     with the side +1. At borders where it jumps, at folds, and where equilibria fill a line, nothing is
@@ -149,7 +153,8 @@ def equilibria(
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
     check_keywords(options, system, equilibria)
     low, high = ends_of(box, system)
-    motions = Motions(system, len(low), system.parameter_values(params), (), options)
+    values = system.parameter_values(params)
+    motions = Motions(at_rest(system, len(low), values), len(low), values, (), options)
     refuse_without_equilibria(motions, states_in(low, high))
     core = motions.prepared.core
     assert isinstance(core, TracedSystem)
@@ -254,23 +259,36 @@ class _Search(NamedTuple):
 def _modes(search: _Search) -> Iterator[tuple[int, ...]]:
     """Yield the modes in which there may be equilibria: those of regions first; at most a few too many."""
     core, n_surfaces = search.core, search.core.n_surfaces
+    regions = core.sign_combinations(_MOST_MODES)
+    if regions is None:
+        yield from itertools.islice(itertools.product((-1, 1), repeat=n_surfaces), _MOST_MODES + 1)
+        return
+    signs = np.array(regions, dtype=np.int64).reshape(len(regions), n_surfaces)
     jumps = [j for j in range(n_surfaces) if core.switches_at(j)]
     count = 0
     for m in range(min(search.n, len(jumps)) + 1):
         for sliding in itertools.combinations(jumps, m):
-            others = [j for j in range(n_surfaces) if j not in sliding]
-            for signs in itertools.product((-1, 1), repeat=len(others)):
-                mode = [0] * n_surfaces
-                for j, sign in zip(others, signs, strict=True):
-                    mode[j] = sign
+            for mode in _beside(signs, list(sliding)):
                 entries = np.array(mode, dtype=np.float64)
                 active = core.active(entries)
                 if not all(active[j] and core.jumps_across(j, entries) for j in sliding):
                     continue
-                yield tuple(mode)
+                yield mode
                 count += 1
                 if count > _MOST_MODES:
                     return
+
+
+def _beside(signs: npt.NDArray[np.int64], sliding: list[int]) -> Iterator[tuple[int, ...]]:
+    """Yield the modes on some surfaces that have regions, a row of signs for each, on all their sides."""
+    others = signs.copy()
+    others[:, sliding] = 0
+    modes, first = np.unique(others, axis=0, return_inverse=True)
+    first = first.ravel()
+    for k, mode in enumerate(modes):
+        sides = signs[np.ix_(first == k, sliding)]
+        if np.all(np.any(sides < 0, axis=0) & np.any(sides > 0, axis=0)):
+            yield tuple(mode.tolist())
 
 
 def _by_bounds(search: _Search, modes: Sequence[tuple[int, ...]]) -> tuple[list[Equilibrium], list[Array]]:

@@ -14,7 +14,7 @@ from filippov.arrays import finite_array
 from filippov.cycles.box import ends_of, equilibria, states_in
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.motions import Array, Motions
-from filippov.cycles.rest import Equilibrium, refuse_without_equilibria
+from filippov.cycles.rest import Equilibrium, at_rest, refuse_without_equilibria
 from filippov.cycles.rest_line import EquilibriumLine
 from filippov.cycles.streamlines import Streamline, streamlines
 from filippov.errors import FilippovError, InputError, ModelError
@@ -187,7 +187,8 @@ def phase_portrait(
         raise InputError(f"box: two intervals (low, high) are needed, one for each state, not {len(window)}")
     if not all(isinstance(cycle, Cycle) for cycle in cycles):
         raise InputError("cycles: each is a Cycle, as of fl.limit_cycle")
-    motions = Motions(system, 2, system.parameter_values(params), (), {})
+    values = system.parameter_values(params)
+    motions = Motions(at_rest(system, 2, values), 2, values, (), {})
     refuse_without_equilibria(motions, states_in(*window.T))
     plane = _Plane(motions, window)
     lines = streamlines(plane.field, plane.mode_at, window, count("density", density))

@@ -23,7 +23,7 @@ from filippov.cycles.cones import Stability, are_alike, stability_in_cones
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.meeting import speed_away
 from filippov.cycles.motions import Array, Motions
-from filippov.errors import InputError, ModelError
+from filippov.errors import InputError, ModelError, TraceError
 from filippov.modes import Mode
 from filippov.options import check_y0
 from filippov.prepare import parameter_vector
@@ -32,6 +32,7 @@ from filippov.system import System
 __all__ = [
     "Equilibrium",
     "EquilibriumCurve",
+    "at_rest",
     "equilibrium",
     "first_multipliers",
     "refuse_without_equilibria",
@@ -533,7 +534,8 @@ def equilibrium(
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
     check_keywords(options, system, equilibrium)
     start = check_y0(y0, states=system._states)
-    motions = Motions(system, len(start), system.parameter_values(params), (), options)
+    values = system.parameter_values(params)
+    motions = Motions(at_rest(system, len(start), values), len(start), values, (), options)
     refuse_without_equilibria(motions, start[None])
     entries = _mode_of(motions, start, mode)
     curve = EquilibriumCurve(motions, entries)
@@ -549,6 +551,19 @@ def equilibrium(
     return found
 
 
+def at_rest(system: System, n: int, values: dict[str, float]) -> System:
+    """Return the system in which equilibria are looked for: with the knots of tables as surfaces."""
+    core = system.prepare(n, 0.0, None, values).core
+    switching = system.with_switching_tables() if isinstance(core, TracedSystem) and core.n_laws else None
+    if switching is None:
+        return system
+    try:
+        other = switching.prepare(n, 0.0, None, values).core
+    except (ModelError, TraceError):
+        return system
+    return switching if isinstance(other, TracedSystem) and not other.n_laws else system
+
+
 def refuse_without_equilibria(motions: Motions, states: Array) -> None:
     """Refuse a system whose motion is not that of one field for all times, at states of shape (k, n).
 
@@ -560,8 +575,8 @@ def refuse_without_equilibria(motions: Motions, states: Array) -> None:
     core = motions.prepared.core
     if isinstance(core, TracedSystem) and core.n_laws:
         raise InputError(
-            f"system: it has laws with a memory or clocks ({', '.join(core.laws())}), and its equilibria are "
-            "not those of a field"
+            f"system: it has quantisers, clocks or laws with a memory ({', '.join(core.laws())}), and its "
+            "equilibria are not those of a field with finitely many surfaces"
         )
     motions.see(states)
     if depends_on_time(motions, 1.0):

@@ -201,6 +201,7 @@ class _Builder:
     def __init__(self, data: Mapping[str, Any], system: System, period: Any) -> None:
         self._params, self._system, self._period = data["params"], system, period
         first = data["points"][0]
+        self._n_surfaces = len(first["mode"] if "mode" in first else first["legs"][0][0])
         self._n = (
             len(first["starts"][0]) if data["kind"] == "cycles" else len(first["w"]) - first["mode"].count(0)
         )
@@ -208,6 +209,10 @@ class _Builder:
     def state(self, row: Mapping[str, Any]) -> State:
         """Return the state of a row."""
         motions = Motions(self._system, self._n, {**self._params, **row["params"]}, (), {})
+        if self._n_surfaces != motions.prepared.core.n_surfaces:
+            # With the knots of tables as surfaces.
+            self._system = self._system.with_switching_tables() or self._system
+            motions = Motions(self._system, self._n, motions.params, (), {})
         if "w" in row:
             return Equilibrium(EquilibriumCurve(motions, row["mode"]), np.array(row["w"]), 0.0)
         legs = []

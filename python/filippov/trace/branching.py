@@ -118,6 +118,8 @@ class Tracer:
         What stands in for the names that traced values cannot be handed to; by default nothing does.
     may_slide : bool
         Whether a motion may slide where an expression jumps; no motion slides on an event.
+    tables_switch : bool
+        Whether the knots of tables are surfaces.
 
     Attributes
     ----------
@@ -148,8 +150,10 @@ class Tracer:
         constants: ConstantsOfMotion | None = None,
         stand_ins: StandIns | None = None,
         may_slide: bool = True,
+        tables_switch: bool = False,
     ) -> None:
         self.builder = builder
+        self.tables_switch = tables_switch
         self.may_slide = may_slide
         self.t0 = t0
         self.y0 = y0

@@ -129,10 +129,10 @@ def polynomial(tracer: Tracer, node: int, table: Table) -> int:
     pieces = tracer.pieces(node, in_full=True)
     if pieces is not None and _has_own_parts(tracer, node, pieces):
         return by_parts(tracer, pieces, lambda part, _: polynomial(tracer, part, table))
-    jumps = table.jumps()
+    jumps = list(range(len(table.knots))) if tracer.tables_switch else table.jumps()
     if len(jumps) > MOST_JUMPS:
         raise NotTraceable(
-            f"a table of the state that jumps at {len(jumps)} places",
+            f"a table of the state that switches at {len(jumps)} places",
             "write a list of its constant values, indexed by np.digitize",
         )
     result = None
@@ -162,6 +162,12 @@ def count(tracer: Tracer, node: int, knots: Vector, *, strictly: bool = False) -
     pieces = tracer.pieces(node, in_full=True)
     if pieces is not None and _has_own_parts(tracer, node, pieces):
         return by_parts(tracer, pieces, lambda part, _: count(tracer, part, knots))
+    if tracer.tables_switch and len(knots) <= MOST_JUMPS:
+        passed = builder.constant(0.0)
+        for k, end in enumerate(knots.tolist()):
+            above = builder.binary("subtract", node, builder.constant(end))
+            passed = tracer.choose(above, builder.constant(float(k + 1)), passed)
+        return passed
     # Nearest to the knot k the expression is behind k knots, or k + 1: a jump of an ordinary surface.
     middles = 0.5 * (knots[1:] + knots[:-1])
     nearest = (

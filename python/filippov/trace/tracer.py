@@ -122,6 +122,7 @@ def trace(
     is_field: bool = True,
     root_ends: str = "",
     beside: Sequence[Callable[..., Any]] = (),
+    tables_switch: bool = False,
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
 
@@ -160,6 +161,8 @@ def trace(
         ``"floor"`` also in the mode on its other side.
     beside : sequence of callables, optional
         Events ``g(t, x, *args)``: the system has their laws too, so that they can be traced beside it.
+    tables_switch : bool, optional
+        Whether the knots of tables of the state are surfaces; else a law says which piece is read.
 
     Returns
     -------
@@ -207,6 +210,7 @@ def trace(
             discrete=discrete,
             constants=constants,
             stand_ins=stand_ins,
+            tables_switch=tables_switch,
         )
 
     def attempt(stand_ins: StandIns | None) -> tuple[Tracer, _Record]:

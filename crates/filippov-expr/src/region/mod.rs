@@ -161,6 +161,31 @@ impl Regions {
         kept
     }
 
+    /// The combinations of signs of all surfaces that points have, as far as linear inequalities between the terms of the
+    /// switching functions show that; `None` if there are more than `most`.
+    pub fn combinations(&mut self, most: usize) -> Option<Vec<Vec<f64>>> {
+        let n = self.graph.n_surfaces();
+        let mut found: Vec<Vec<f64>> = vec![Vec::new()];
+        for _ in 0..n {
+            let mut longer = Vec::new();
+            for known in found {
+                for sign in [-1.0, 1.0] {
+                    let signs: Vec<f64> = known.iter().copied().chain([sign]).collect();
+                    let mut partial: Vec<Option<f64>> = signs.iter().copied().map(Some).collect();
+                    partial.resize(n, None);
+                    if self.possible(&partial, None) == Possible::Yes {
+                        longer.push(signs);
+                    }
+                }
+            }
+            if longer.len() > most {
+                return None;
+            }
+            found = longer;
+        }
+        Some(found)
+    }
+
     /// The regions of an expression; the search is given up after looking at `most` combinations of signs.
     ///
     /// Combinations that no point has are left out, as far as linear inequalities between the terms of the switching

@@ -236,3 +236,20 @@ fn edges() {
     assert_eq!(regions.edge(inside), None);
     assert_eq!(regions.edge(size), None);
 }
+
+#[test]
+fn knots_in_a_row_are_passed_in_their_order() {
+    let mut g = Graph::new();
+    let x = g.state(0);
+    for k in 0..20 {
+        let knot = g.constant(f64::from(k));
+        let beyond = g.sub(x, knot);
+        g.sign(beyond);
+    }
+    let mut regions = Regions::new(g, vec![], vec![]);
+    let found = regions.combinations(30).unwrap();
+    assert_eq!(found.len(), 21);
+    let sums: Vec<f64> = found.iter().map(|signs| signs.iter().sum()).collect();
+    assert!(sums.windows(2).all(|pair| pair[1] == pair[0] + 2.0));
+    assert_eq!(regions.combinations(20), None);
+}
