@@ -128,7 +128,7 @@ def equilibria(
 
     Notes
     -----
-    The knots of tables of states (``np.interp``, splines, lists indexed by ``np.digitize``) are surfaces here:
+    The knots of tables of states (``np.interp``, splines, lists indexed by ``np.digitize``) are surfaces:
     modes have an entry for each.
 
     An equilibrium on the border of its region, or a pseudo-equilibrium at the end of its sliding segment, may
