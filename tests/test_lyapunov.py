@@ -187,11 +187,22 @@ def test_wrong_arguments_are_refused(arguments: dict[str, Any], message: str) ->
         fl.lyapunov(FRICTION, **given)
 
 
+def test_parameters_with_the_name_of_a_dimension_are_refused() -> None:
+    system = fl.System(lambda t, x, index=1.0: [-index * x[0] + np.sin(t)], n=1)
+    with pytest.raises(fl.InputError, match="'index' would occur twice"):
+        fl.lyapunov(system, (0, 20), [1.0], {"index": [0.5, 1.0]})
+    # A number is no dimension.
+    assert fl.lyapunov(system, (0, 20), [1.0], {"index": 0.5}).exponent.values == pytest.approx(-0.5)
+
+
 def test_systems_without_derivatives_are_refused() -> None:
     with pytest.raises(fl.InputError, match="discrete states"):
         fl.lyapunov(fl.System(lambda t, x, k=1.0: [-k * x[0]], n=1, discrete={"k": 1.0}), (0, 1), [1.0])
     with pytest.raises(fl.InputError, match="System is needed"):
         fl.lyapunov(lambda t, x: x, (0, 1), [1.0])  # type: ignore[arg-type]
+    bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.8 * float(str(x[1]))], direction="down")
+    with pytest.raises(fl.InputError, match=r"^system: the map of the reset 'reset' is not traced"):
+        fl.lyapunov(fl.System(lambda t, x: [x[1], -9.8], n=2, resets=bounce), (0, 1), [1.0, 0.0])
 
 
 @pytest.mark.parametrize("section", [None, fl.Phase(1.0)])

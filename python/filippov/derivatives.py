@@ -135,8 +135,10 @@ def check_wrt(
     return Wanted(tuple(found), list(found.values()), [places[name] for name in asked], int(order))
 
 
-def refuse_without_derivatives(prepared: Prepared, t_span: tuple[float, float]) -> None:
-    """Refuse derivatives of what has none.
+def refuse_without_derivatives(
+    prepared: Prepared, t_span: tuple[float, float] = (0.0, 1.0), argument: str = "wrt"
+) -> None:
+    """Refuse derivatives of what has none, which an argument asks for.
 
     Raises
     ------
@@ -145,13 +147,13 @@ def refuse_without_derivatives(prepared: Prepared, t_span: tuple[float, float]) 
     """
     if not isinstance(prepared.core, TracedSystem):
         raise InputError(
-            "wrt: derivatives are those of a traced function, and this one is called: "
+            f"{argument}: derivatives are those of a traced function, and this one is called: "
             f"{prepared.why_untraced}"
         )
     for action in prepared.actions:
         if not isinstance(action.map, TracedSystem):
             raise InputError(
-                f"wrt: the map of the reset {action.name!r} is not traced: its derivative is not known"
+                f"{argument}: the map of the reset {action.name!r} is not traced: its derivative is not known"
             )
     if t_span[1] < t_span[0]:
         raise InputError(FORWARD_ONLY)

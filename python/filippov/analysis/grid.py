@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -111,7 +111,13 @@ class Grid(NamedTuple):
         return tuple(axis.name for axis in self.axes)
 
 
-def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str | None = None) -> Grid:
+def grid_of(
+    system: System,
+    y0: Any,
+    params: Mapping[str, Any] | None,
+    last: str | None = None,
+    taken: Collection[str] = (),
+) -> Grid:
     """Return the points of a sweep.
 
     Parameters
@@ -124,6 +130,8 @@ def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str
         Numbers, and arrays: each array is a dimension of the name of the parameter.
     last : str, optional
         The dimension that is to be the last one, in which neighbours follow one another.
+    taken : collection of str, optional
+        Further names that the result has.
 
     Raises
     ------
@@ -143,7 +151,8 @@ def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str
                 f"{', '.join(names) or 'none: give an array in params'}"
             )
         axes.append(axes.pop(names.index(last)))
-    clash = [name for axis in axes for name in axis.coordinates if name in states or name in RESERVED]
+    own = RESERVED.union(taken)
+    clash = [name for axis in axes for name in axis.coordinates if name in states or name in own]
     clash += [name for name in states if name in RESERVED]
     if clash:
         raise InputError(

@@ -102,9 +102,10 @@ def options_of(given: Mapping[str, Any], t_span: tuple[float, float], n: int) ->
     InputError
         If an option is wrong, or means nothing here.
     """
-    for name in given:
-        if name in _OWN:
+    for name, value in given.items():
+        if name in _OWN and value is not None:
             raise InputError(f"{name}: has no place here; {_OWN[name]}")
+    given = {name: value for name, value in given.items() if name not in _OWN}
     if given.get("nonunique") == "branch":
         raise InputError('nonunique: "branch" is for single runs')
     end = t_span[1] if math.isfinite(t_span[1]) else _LONGEST

@@ -194,10 +194,7 @@ class Motions:
         """Take these values of the parameters."""
         values = self.system.parameter_values(params)
         prepared = self.system.prepare(self.n, 0.0, None, values)
-        try:
-            refuse_without_derivatives(prepared, (0.0, 1.0))
-        except InputError as error:
-            raise InputError(f"system: {str(error).removeprefix('wrt: ')}") from None
+        refuse_without_derivatives(prepared, argument="system")
         assert isinstance(prepared.core, TracedSystem)
         self._prepared, self._core = prepared, prepared.core
         self._take(values)

@@ -665,6 +665,10 @@ impl<'a> Piece<'a> {
         let Some((by_time, slopes)) = slopes else {
             return Ok(false);
         };
+        // Beyond the surface the motion goes along it everywhere, as at a level that nothing leaves.
+        if by_time == 0.0 && slopes.iter().all(|slope| *slope == 0.0) {
+            return Ok(false);
+        }
         let ends = |sign: f64| -> Result<Row, FieldError> {
             let signs: Vec<_> = self.sliding.iter().map(|&j| (j, sign)).collect();
             self.corner(t, z, &signs)
