@@ -283,10 +283,9 @@ def _beside(signs: npt.NDArray[np.int64], sliding: list[int]) -> Iterator[tuple[
     """Yield the modes on some surfaces that have regions, a row of signs for each, on all their sides."""
     others = signs.copy()
     others[:, sliding] = 0
-    modes, first = np.unique(others, axis=0, return_inverse=True)
-    first = first.ravel()
+    modes, which = np.unique(others, axis=0, return_inverse=True)
     for k, mode in enumerate(modes):
-        sides = signs[np.ix_(first == k, sliding)]
+        sides = signs[np.ix_(which.ravel() == k, sliding)]
         if np.all(np.any(sides < 0, axis=0) & np.any(sides > 0, axis=0)):
             yield tuple(mode.tolist())
 

@@ -119,13 +119,10 @@ class Itinerary(NamedTuple):
         turned = Itinerary(
             (*legs[k:], *later), times[k], (*starts[k:], *starts[:k]), (*durations[k:], *durations[:k])
         ).merged()
-        # Nothing happens where it ends if it goes on there.
-        closing = turned.legs[-1]
-        return (
-            turned._replace(legs=(*turned.legs[:-1], closing._replace(ending=None)))
-            if closing.is_cut
-            else turned
-        )
+        *others, closing = turned.legs
+        if closing.is_cut:  # nothing happens where it ends
+            turned = turned._replace(legs=(*others, closing._replace(ending=None)))
+        return turned
 
     def has_events(self) -> bool:
         """Whether a leg ends at an event."""
