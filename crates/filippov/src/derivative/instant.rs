@@ -333,11 +333,23 @@ impl Instant<'_, '_> {
             return Ok(false);
         }
         let onto_surfaces = self.before.projection(&[], t, &z)?;
+        if !self.record.acts.is_empty() {
+            return Ok(true);
+        }
         for guard in others {
-            if !matches!(guard, Guard::Surface(_)) || !self.record.acts.is_empty() {
-                return Ok(true);
-            }
-            let own = self.before.gradient_of(guard, t, &z)?;
+            let own = match guard {
+                Guard::Surface(_) => self.before.gradient_of(guard, t, &z)?,
+                // Sliding on a surface ends where the field of the side that it is left to becomes tangent to it; its multiplier may be
+                // a quotient of two functions that vanish.
+                Guard::Multiplier { surface, end }
+                    if self.before.sliding[..] == [surface]
+                        && self.record.mode[1].entries()[surface] == end
+                        && !self.extended.system.sticks_at(surface) =>
+                {
+                    self.before.gradient_of_rate((surface, end), t, &z)?
+                }
+                _ => return Ok(true),
+            };
             let rate = own.time + dot(&own.state, self.record.field[0]);
             let size = own
                 .state

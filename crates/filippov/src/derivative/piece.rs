@@ -640,6 +640,24 @@ impl<'a> Piece<'a> {
         Ok(Timing { time, state })
     }
 
+    /// The derivatives of the rate of h_j along the field of a side, by the time and by the extended state.
+    pub fn gradient_of_rate(
+        &self,
+        (j, side): (usize, i8),
+        t: f64,
+        z: &[f64],
+    ) -> Result<Timing, FieldError> {
+        let mut signs: SmallVec<[f64; 8]> = SmallVec::from_slice(&self.signs);
+        signs[j] = f64::from(side);
+        let mut state = Row::from_elem(0.0, z.len());
+        let place = Setting::new(&signs, &self.q).at(t, z);
+        let found = self.extended.system.rate_gradient(j, &place, &mut state)?;
+        Ok(Timing {
+            time: found.time,
+            state,
+        })
+    }
+
     /// Is it a motion whose changes are not followed: on a surface of higher relative degree, or at rest where its fields are not
     /// regular?
     pub fn is_unsupported(&self) -> bool {
