@@ -117,7 +117,7 @@ impl<'a> Units<'a> {
 
     /// The size of the states for which these are the tolerances: the default ones are for states of size 1.
     pub fn size_meant(options: &Options) -> f64 {
-        Units::from(options).least / Units::from(&Options::default()).least
+        Units::from(options).least * (Options::RTOL / Options::ATOL)
     }
 
     /// Those at a point: a state that is zero has the size of the smallest one there that is not, in comparison.

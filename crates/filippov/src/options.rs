@@ -166,12 +166,20 @@ pub struct Options {
     pub keep_decisions: usize,
 }
 
+impl Options {
+    /// The relative tolerance where none is given.
+    pub(crate) const RTOL: f64 = 1e-6;
+
+    /// The absolute tolerance where none is given, for states of size 1.
+    pub(crate) const ATOL: f64 = 1e-9;
+}
+
 impl Default for Options {
     fn default() -> Self {
         Options {
             method: Method::default(),
-            rtol: 1e-6,
-            atol: vec![1e-9],
+            rtol: Options::RTOL,
+            atol: vec![Options::ATOL],
             first_step: None,
             max_step: f64::INFINITY,
             max_steps: 100_000_000,
