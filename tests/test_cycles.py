@@ -500,3 +500,59 @@ def test_a_clock_beside_another_forcing() -> None:
         cycle.derivative("T")
     with pytest.raises(fl.ModelError, match="what else acts does not repeat itself"):
         fl.continuation(cycle, "T", (1.5, 2.5))
+
+
+@pytest.mark.parametrize(("force", "omega"), [(0.5, 0.5), (0.6, 0.45), (0.63, 0.43)])
+@pytest.mark.parametrize("initial", [1, -1])
+def test_cycles_keep_the_memory_of_a_relay(force: float, omega: float, initial: int) -> None:
+    """Moved to its phase a cycle began with `initial` of the relay, and not with what it was there."""
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.3, 0.3, initial=initial)
+
+    def fun(t: float, x: Any) -> list[Any]:
+        return [x[1], 1.1 * np.sin(omega * t) - 1.3 * x[0] - force * relay(t, x) - 0.3 * x[1]]
+
+    system, period = fl.System(fun, n=2), 2 * np.pi / omega
+    cycle = fl.limit_cycle(system, [1.0, 0.5], period=period)
+    run = system.solve((0, 60 * period), [1.0, 0.5], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(cycle.y0, run.y[:, -1], atol=1e-7)
+
+
+def test_cycles_keep_discrete_states() -> None:
+    """The run sets u = 2 for good; the cycle was that of u = 1, or of no motion."""
+    latch = fl.Reset(lambda t, x: x[0] - 0.5, set={"u": 2.0}, direction="up")
+
+    def forced(t: float, x: Any, u: float) -> list[Any]:
+        return [x[1], np.sin(t / 2) - x[0] - 0.2 * u * np.sign(x[1]) - 0.3 * x[1]]
+
+    found = []
+    for u in (1.0, 2.0):
+        system = fl.System(forced, n=2, discrete={"u": u}, resets=latch)
+        cycle = fl.limit_cycle(system, [1.0, 0.0], period=4 * np.pi)
+        found.append(np.append(cycle.y0, np.abs(cycle.multipliers)))
+        assert cycle.is_admissible
+        assert np.all(cycle.solution.state("u") == 2.0)
+        np.testing.assert_allclose(cycle.solution.y[:, -1], cycle.y0, atol=1e-6)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+
+    def free(t: float, x: Any, u: float) -> list[Any]:
+        return [x[1], -u * x[0] - 0.3 * x[1] + 0.6 * np.sign(x[1])]
+
+    periods = [
+        fl.limit_cycle(fl.System(free, n=2, discrete={"u": u}, resets=latch), [0.2, 1.0]).period
+        for u in (1.0, 2.0)
+    ]
+    # Damped by 0.3 / 2, and pushed at each turn.
+    known = 2 * np.pi / np.sqrt(2 - 0.15**2)
+    assert periods == pytest.approx([known, known], abs=1e-9)
+
+
+def test_a_guess_of_a_system_with_discrete_states() -> None:
+    far = fl.Reset(lambda t, x: x[0] - 20, set={"u": 2.0}, direction="up")
+
+    def fun(t: float, x: Any, u: float) -> list[Any]:
+        return [x[1], np.sin(t / 2) - x[0] - 0.2 * u * np.sign(x[1]) - 0.3 * x[1]]
+
+    system = fl.System(fun, n=2, discrete={"u": 1.0}, resets=far)
+    cycle = fl.limit_cycle(system, [19.0, 10.0], period=4 * np.pi)
+    run = system.solve((0, 80 * np.pi), cycle.y0, {"u": cycle.params["u"]})
+    np.testing.assert_allclose(run.y[:, -1], cycle.y0, atol=1e-6)

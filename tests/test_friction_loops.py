@@ -161,3 +161,27 @@ def test_more_contacts_than_can_share_a_load_are_refused_by_name() -> None:
     sol = fl.solve_ivp(field, (0, 1), np.zeros(2 * n))
     assert not sol.success
     assert "17 contacts close loops with one another and share one load; at most 13 may" in sol.message
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+@pytest.mark.parametrize(("rate", "push"), [(1.0, 1.0), (0.3, 1.2), (2.7, 0.9), (1.0, 1.1)])
+def test_bodies_in_a_loop_break_away_in_every_round(rate: float, push: float, method: str) -> None:
+    """At rest steps become long, and the strength that is left was looked at in a few places of each."""
+
+    def bodies(t: float, x: Any) -> list[Any]:
+        a, b = x[2], x[3]
+        rub = 0.3 * np.sign(b - a)
+        return [
+            a,
+            b,
+            push * np.sin(rate * t) - 0.45 - np.sign(a) + rub,
+            0.46 - 0.3 * np.sign(b) - rub,
+        ]
+
+    # They stick while the contact can take r in [0.16, 0.3] from the second: the push is above -1.3 + 0.45.
+    first, period = (1.5 * np.pi - np.arccos(0.85 / push)) / rate, 2 * np.pi / rate
+    end = 9.5 * period
+    sol = fl.solve_ivp(bodies, (0, end), [0.0, 0.0, 0.0, 0.0], method=method)
+    exits = [one.t for one in sol.switches if one.kind == "exit_sliding" and str(one.mode_before) == "000"]
+    assert sol.success, sol.message
+    np.testing.assert_allclose(exits, first + period * np.arange(9), atol=1e-6)

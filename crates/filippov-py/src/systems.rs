@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use filippov::derivative::Extension;
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
-    field_off_surfaces, Definition, Error, FieldError, Laws, Mode, OffSurfaces, PiecewiseSystem,
-    Rules, Setting, SignStructure,
+    field_off_surfaces, Definition, Error, FieldError, Law, Laws, Mode, OffSurfaces,
+    PiecewiseSystem, Rules, Setting, SignStructure,
 };
 use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names, Regions};
@@ -519,6 +519,13 @@ impl TracedSystem {
 
     fn is_native(&self) -> bool {
         self.system.is_native()
+    }
+
+    /// Which discrete states are those of relays with two thresholds.
+    fn relays(&self) -> Vec<usize> {
+        let laws = self.laws.list().iter().enumerate();
+        let relays = laws.filter(|(_, law)| matches!(law, Law::Hysteresis { .. }));
+        relays.map(|(index, _)| index).collect()
     }
 
     /// The names of all discrete states, those of laws included.

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import TracedSystem
 from filippov.analysis import Phase, Section
 from filippov.analysis.sections import as_section
 from filippov.cycles.forcing import (
@@ -201,7 +202,7 @@ class Cycle:
         if self.itinerary.is_closed_by_event() or not self.itinerary.has_events():
             return self
         shooting = self._shooting
-        return cycle_at(shooting.motions, *self.inside(), self.period, shooting.period)
+        return cycle_at(*self._from_inside(), self.period, shooting.period)
 
     def in_first_period(self) -> Cycle:
         """Return the same cycle of a forced system, begun in the first period from time 0.
@@ -223,6 +224,10 @@ class Cycle:
 
         A run can start there: at a switch, and in contact, the state does not say what it does.
         """
+        return self._from_inside()[1:]
+
+    def _from_inside(self) -> tuple[Motions, float, Array]:
+        """Return the same, behind motions whose named discrete states begin as they are there."""
         itinerary, motions = self.itinerary, self._shooting.motions
         lost = [_codimension(motions, leg) for leg in itinerary.legs]
         # Durations are rounded, so that pieces of the same length compare as equal.
@@ -230,7 +235,9 @@ class Cycle:
         ranked = zip(lost, shares, strict=True)
         place = min(range(len(lost)), key=list(ranked).__getitem__)
         t = self.t0 + sum(itinerary.durations[:place]) + 0.5 * itinerary.durations[place]
-        return t, self.at(t)
+        own = motions.copy()
+        own.begin_with(itinerary.legs[place].discrete)
+        return own, t, self.at(t)
 
     def derivative(self, name: str) -> CycleDerivative:
         """Return the derivative by a parameter.
@@ -357,9 +364,9 @@ def follows_itinerary(cycle: Cycle) -> bool:
     if len(cycle._parts.legs) > len(cycle.itinerary.legs):  # a run would leave it
         shot = cycle._shooting.shoot(cycle._u, PLACES)
         return all(probe.value > -_ROUNDING for probe in probes_of(cycle._shooting, cycle._u, shot))
-    (t, x), period = cycle.inside(), cycle.period
+    (motions, t, x), period = cycle._from_inside(), cycle.period
     try:
-        record = cycle._shooting.motions.record((t, t + 1.02 * period), x)
+        record = motions.record((t, t + 1.02 * period), x)
         found = itinerary_of(record, t, t + period)
     except ModelError:
         return False
@@ -531,7 +538,7 @@ def _cycle_beside(
         if is_free or found.is_admissible:
             break
         # The flow takes other pieces there.
-        t0, x = found.inside()
+        motions, t0, x = found._from_inside()
     assert found is not None
     return found
 
@@ -551,6 +558,7 @@ def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
         shooting, u = finer
     u, shot, residual = solve(shooting, u)
     _refuse_samples(shooting, shot)
+    motions.begin_with(shooting.legs[0].discrete)
     return Cycle(shooting, u, shot, residual)
 
 
@@ -577,6 +585,14 @@ def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
             raise ModelError(
                 "the cycle holds samples of its state: they change with it, and its pieces have no constants"
             )
+    core = shooting.motions.prepared.core
+    relays = core.relays() if isinstance(core, TracedSystem) else []
+    first, last = shooting.legs[0].discrete, shot.passages[-1].discrete
+    if any(first[k] != last[k] for k in relays):
+        raise ModelError(
+            "a relay is on its other side after one period: no motion repeats itself so. A run begins with "
+            "initial= of the relay wherever it starts between the thresholds; give it the other value"
+        )
 
 
 def _check_section(section: Any) -> Phase | Event | None:
@@ -690,6 +706,7 @@ def _repeated_forced(
         # A run can start where no surface is slid on.
         phase = int(np.argmin([solution.mode_at(t).codimension for t in phases]))
         start, points = float(phases[phase]), solution.y[:, phase::_PHASES]
+        motions.begin_as(solution, start)
         size = np.max(np.abs(points), axis=1) + 1e-12
         distances = np.max(np.abs(points[:, 1:] - points[:, :1]) / size[:, None], axis=0)
         near = max(_NEAR, 10 * float(np.min(distances))) if np.min(distances) < 1e-2 else 0.0
@@ -702,7 +719,7 @@ def _repeated_forced(
                 turns = turns_of(found, multiple)
                 if turns > 1:
                     forcing.multiple = multiple // turns
-                    found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
+                    found = cycle_at(*found._from_inside(), found.period / turns, forcing)
                 if _attracts(found):
                     return found
                 problem = "; the cycle near it is unstable"
@@ -723,6 +740,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
         t, end = _last_inside(solution)
+        motions.begin_as(solution, t)
         size = np.max(np.abs(solution.y), axis=1) + 1e-300
         is_large = np.max(np.abs(end)) > 1e8 * (np.max(np.abs(x)) + 1.0)
         if is_large and _grows(solution):
@@ -757,7 +775,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                     most = len(found.itinerary.legs) if found.itinerary.has_events() else k + 1
                     turns = turns_of(found, most)
                     if turns > 1:
-                        found = cycle_at(motions, *found.inside(), found.period / turns, None)
+                        found = cycle_at(*found._from_inside(), found.period / turns, None)
                     if _attracts(found):
                         return found
                     problem = ", and the cycle near it is unstable"
@@ -834,8 +852,8 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     is_timed = isinstance(section, Phase) or (section is None and forcing is not None)
     if section is None and not is_timed:
         return cycle
-    t, x = cycle.inside()
-    if is_timed and _counts_time(cycle.itinerary):
+    inner, t, x = cycle._from_inside()
+    if is_timed and _counts_time(cycle):
         turns = np.ceil((t - t0) / period - 1e-9)
         start = cycle.at(t0 + turns * period, before=True)
         return cycle_at(motions, t0, start, period, forcing, is_free=True)
@@ -843,7 +861,7 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
         at = cycle.t0 + (t0 - cycle.t0) % period
         return cycle_of(motions, cycle.itinerary.from_place(at, cycle.at(at)).from_time(t0), forcing)
     assert isinstance(section, Event)
-    times, _ = _first_event(motions.run((t, t + 1.05 * period), x, events=section))
+    times, _ = _first_event(inner.run((t, t + 1.05 * period), x, events=section))
     if not len(times):
         raise ModelError(f"section: the cycle does not reach {section.name or 'it'}")
     at = cycle.t0 + (float(times[0]) - cycle.t0) % period
@@ -852,9 +870,8 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     return moved
 
 
-def _counts_time(itinerary: Itinerary) -> bool:
-    """Whether clocks tick in the cycle: their counts fix its start in time."""
-    endings = (leg.ending for leg in itinerary.legs)
-    return any(leg.discrete for leg in itinerary.legs) or any(
-        e is not None and e.guard is None for e in endings
-    )
+def _counts_time(cycle: Cycle) -> bool:
+    """Whether clocks tick in the cycle: their counts, which a period changes, fix its start in time."""
+    legs = cycle._parts.legs
+    ticks = any(leg.ending is not None and leg.ending.guard is None and not leg.is_cut for leg in legs)
+    return ticks or cycle._shot.passages[-1].discrete != legs[0].discrete

@@ -102,7 +102,8 @@ def _gap(motions: Motions, t0: float, x: Array, duration: float, size: Array) ->
     near = 1e-6 * duration
     times = t0 + np.array([0.0, near, duration - near, duration])
     states = (run.sol(times) / size[:, None]).T
-    by_start = np.asarray(run.derivative()) * (size / size[:, None])
+    n = len(size)  # discrete states have rows behind these
+    by_start = np.asarray(run.derivative())[:n] * (size / size[:, None])
     moves = float(np.max(np.ptp(run.y, axis=1) / size))
     found = _Gap(states[3] - states[0], by_start, np.diff(states, axis=0)[[0, 2]] / 1e-6, moves)
     return found if np.isfinite(by_start).all() else None

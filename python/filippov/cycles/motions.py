@@ -213,6 +213,18 @@ class Motions:
         self._held = None
         self._guards: dict[tuple[Mode, tuple[float, ...]], list[Guard]] = {}
 
+    def begin_with(self, q: Sequence[float]) -> None:
+        """Let runs begin with these values of the named discrete states, which are the first of all."""
+        names = self.system.discrete
+        if names:
+            self.use({**self._params, **dict(zip(names, map(float, q), strict=False))})
+
+    def begin_as(self, solution: Solution, t: float) -> None:
+        """Let runs begin with what the named discrete states are at a time of a run."""
+        n = len(self.system.discrete)
+        if n and isinstance(solution._run, Run):
+            self.begin_with(solution._run.discrete(np.array([t]), n, False)[:, 0].tolist())
+
     def see(self, states: Array) -> None:
         """Take states, shape (k, n), as those of the problem: the forcing is looked for there."""
         finite = states[np.isfinite(states).all(axis=1)]

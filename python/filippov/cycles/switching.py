@@ -105,13 +105,12 @@ def _cycle_at_hopf(state: Equilibrium, name: str, size: float) -> Cycle:
 def _doubled(cycle: Cycle) -> Cycle:
     """Return a cycle that is followed twice as one of twice the period."""
     own = cycle.from_event()
-    shooting = own._shooting
-    motions, period = shooting.motions, shooting.period
+    period = own._shooting.period
     if period is not None:
         period = period.twice()
     if not own.itinerary.has_events() and not own.itinerary.is_closed_by_event():
         return _as_doubled(own, own._parts.twice(), period)
-    t, x = own.inside()
+    motions, t, x = own._from_inside()
     record = motions.record((t, t + 4.2 * own.period), x)
     itinerary = itinerary_from_event(record, 2 * own.period)
     if itinerary is None:

@@ -1,6 +1,6 @@
 //! Bounds of the multipliers while the normal components move within intervals.
 
-use filippov_expr::Interval;
+use filippov_expr::{Enclosure, Interval};
 use smallvec::SmallVec;
 
 use super::small_matrix::Matrix;
@@ -22,6 +22,8 @@ pub struct EnclosedRoot {
     pub rates: IntervalVector,
     /// The diagonal of G in a box around them, where G is invertible; empty if G is constant.
     pub diagonal: IntervalVector,
+    /// For multipliers of contacts that share a load what is left of their strength, with its rate; empty if there are none.
+    pub reserves: Vec<Option<Enclosure>>,
 }
 
 /// What could be said of the multipliers. A box would be an allocation in every step.
@@ -60,6 +62,7 @@ pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> RootBounds {
                 multipliers: image,
                 rates: IntervalVector::new(),
                 diagonal,
+                reserves: Vec::new(),
             });
         }
         for (l, k) in guess.iter_mut().zip(&image) {

@@ -30,7 +30,9 @@ pub use roots::{
     is_undetermined, least_multipliers, multiplier_rates, newton, roots_in_cube, stable_roots,
     stable_roots_with_border, stable_roots_within, zero_between, Roots,
 };
-pub use shared_load::{stay_together, KnownUniqueness, SharedLoad, SharedLoads, Uniqueness};
+pub use shared_load::{
+    stay_together, KnownUniqueness, PartsTaken, SharedLoad, SharedLoads, Uniqueness,
+};
 pub(crate) use small_matrix::{invert, Elimination};
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{

@@ -36,6 +36,9 @@ pub struct SharedLoad {
     pub reserves: Vec<Option<f64>>,
 }
 
+/// The surfaces of a loop, and for each direction the factors of their nu.
+pub type PartsTaken = (Vec<usize>, Vec<Vec<f64>>);
+
 /// What the multipliers of surfaces follow from, for one N.
 #[derive(Clone)]
 pub struct SharedLoads {
@@ -83,6 +86,18 @@ impl SharedLoads {
     /// The surfaces whose signs act on no rate.
     pub fn idle(&self) -> &[usize] {
         &self.idle
+    }
+
+    /// The surfaces with multipliers of their own.
+    pub fn regular(&self) -> &[usize] {
+        &self.regular
+    }
+
+    /// The parts of the strength of each loop that a load takes in all directions, as sums of nu: of each the surfaces, and the factors
+    /// of the nu of these. The reserve is one less the largest of their sizes. `None` if too many contacts share one load.
+    pub fn parts_taken(&self) -> Option<Vec<PartsTaken>> {
+        let parts = self.loops.iter().map(Loop::parts_taken);
+        parts.collect()
     }
 
     /// The surfaces of the contacts that share a load.
@@ -283,10 +298,16 @@ impl Loop {
 
     /// c, the load in terms of Q.
     fn load(&self, nu: &[f64]) -> Vec<f64> {
+        let own: Vec<f64> = self.surfaces.iter().map(|&i| nu[i]).collect();
+        self.load_of(&own)
+    }
+
+    /// The same, from the rates of its own contacts.
+    fn load_of(&self, nu: &[f64]) -> Vec<f64> {
         let mut load = Vec::with_capacity(self.leading.len());
         for (k, (i, row)) in self.leading.iter().enumerate() {
             let known = dot(&row[..k], &load);
-            load.push((-nu[self.surfaces[*i]] - known) / row[k]);
+            load.push((-nu[*i] - known) / row[k]);
         }
         load
     }
@@ -294,6 +315,18 @@ impl Loop {
     /// The multiplier of a contact in the solution of least norm.
     fn sign(&self, place: usize, load: &[f64]) -> f64 {
         dot(&self.columns[place], load) / self.weights[place]
+    }
+
+    fn parts_taken(&self) -> Option<PartsTaken> {
+        let loads = (0..self.surfaces.len()).map(|place| {
+            let mut nu = vec![0.0; self.surfaces.len()];
+            nu[place] = 1.0;
+            self.load_of(&nu)
+        });
+        let loads: Vec<Vec<f64>> = loads.collect();
+        let of_normal = |normal: &Vec<f64>| loads.iter().map(|load| dot(load, normal)).collect();
+        let parts = self.facets.iter().map(of_normal);
+        (!self.facets.is_empty()).then(|| (self.surfaces.clone(), parts.collect()))
     }
 
     /// One less the part of the strength of all contacts together that the load takes.

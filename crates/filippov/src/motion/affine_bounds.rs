@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use filippov_expr::{Enclosure, Interval, Motion};
 use smallvec::SmallVec;
 
-use crate::cube::IntervalVector;
+use crate::cube::{IntervalVector, PartsTaken, SharedLoads};
 use crate::mode::Signs;
 use crate::page::IS_PAGE;
 use crate::sparse::{SparseRows, SparseSolver};
@@ -31,6 +31,9 @@ pub struct AffineBounds {
     matrix: SparseRows,
     /// Contacts whose sign acts on no other rate, and whose rate no other sign acts on.
     is_uncoupled: Vec<bool>,
+    /// Those with multipliers of their own; the others share loads.
+    regular: Vec<usize>,
+    loops: Vec<PartsTaken>,
     normal: RefCell<SparseSolver>,
     /// None where N is diagonal, as `<N>` is N then but for signs.
     comparison: Option<RefCell<SparseSolver>>,
@@ -42,6 +45,9 @@ pub struct EnclosedMultipliers {
     pub values: IntervalVector,
     /// Their derivatives in time; empty if they are not known to be finite.
     pub rates: IntervalVector,
+    /// For contacts that share a load what is left of their strength, with its rate; empty if there are none. Their multipliers have
+    /// no bounds.
+    pub reserves: Vec<Option<Enclosure>>,
 }
 
 /// What is known of the multipliers.
@@ -56,15 +62,23 @@ pub struct KnownMultipliers<'k> {
 }
 
 impl AffineBounds {
-    /// The bounds where N is this matrix; `None` if it is singular, or its comparison matrix is no M-matrix.
+    /// The bounds where N is this matrix; `None` if it is singular and its contacts do not share loads, or if its comparison matrix is
+    /// no M-matrix.
     pub fn new(matrix: &SparseRows) -> Option<Self> {
         let mut normal = SparseSolver::default();
-        normal.factor(matrix).ok()?;
+        let (mut regular, mut loops) = ((0..matrix.n_rows()).collect(), Vec::new());
+        if normal.factor(matrix).is_err() {
+            let shared = SharedLoads::new(matrix).filter(|shared| shared.idle().is_empty())?;
+            regular = shared.regular().to_vec();
+            loops = shared.parts_taken()?;
+            normal.factor(&matrix.principal(&regular)).ok()?;
+        }
+        let block = matrix.principal(&regular);
         let mut comparison = None;
-        if !matrix.is_diagonal() {
+        if !block.is_diagonal() {
             let mut solver = SparseSolver::default();
-            solver.factor(&matrix.comparison()).ok()?;
-            let mut positive = vec![1.0; matrix.n_rows()];
+            solver.factor(&block.comparison()).ok()?;
+            let mut positive = vec![1.0; block.n_rows()];
             solver.solve(&mut positive);
             // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
             if !positive.iter().all(|v| v.is_finite() && *v > 0.0) {
@@ -75,6 +89,8 @@ impl AffineBounds {
         Some(AffineBounds {
             matrix: matrix.clone(),
             is_uncoupled: uncoupled(matrix),
+            regular,
+            loops,
             normal: RefCell::new(normal),
             comparison,
         })
@@ -116,6 +132,7 @@ impl AffineBounds {
             values.push(enclosure.value);
             rates.push(enclosure.rate);
         }
+        let reserves = self.reserves(&values, &rates, near);
         let mut values = self.changes(&values)?;
         for (value, &lambda) in values.iter_mut().zip(near) {
             *value = *value + Interval::point(lambda);
@@ -127,13 +144,91 @@ impl AffineBounds {
                 *rate = Interval::ALL;
             }
         }
-        Some(EnclosedMultipliers { values, rates })
+        Some(EnclosedMultipliers {
+            values,
+            rates,
+            reserves,
+        })
     }
 
-    /// -N^-1 g for all g within these bounds; `None` if one of them is not finite.
+    /// What is left of the strength of contacts that share a load, from bounds of the rates at the multipliers `near`, and of what
+    /// these do in time.
+    fn reserves(
+        &self,
+        values: &[Interval],
+        rates: &[Interval],
+        near: &[f64],
+    ) -> Vec<Option<Enclosure>> {
+        if self.loops.is_empty() {
+            return Vec::new();
+        }
+        let mut found = vec![None; values.len()];
+        let sum = |factors: &[f64], of: &dyn Fn(usize) -> Interval, rows: &[usize]| {
+            let terms = factors.iter().zip(rows);
+            terms.fold(Interval::ZERO, |sum, (&a, &row)| sum + of(row).scaled(a))
+        };
+        let nu = |row: usize| {
+            let entries = self.matrix.row(row);
+            let at_signs: f64 = entries.map(|(k, n)| n * near[k]).sum();
+            values[row] + Interval::point(-at_signs)
+        };
+        for (rows, parts) in &self.loops {
+            let taken = parts.iter().map(|factors| {
+                let part = sum(factors, &nu, rows);
+                (part, sum(factors, &|row| rates[row], rows))
+            });
+            let taken: Vec<(Interval, Interval)> = taken.collect();
+            // The largest part at least, and at most.
+            let least = taken.iter().map(|(part, _)| {
+                let is_around_zero = part.lo <= 0.0 && part.hi >= 0.0;
+                match is_around_zero {
+                    true => 0.0,
+                    false => part.lo.abs().min(part.hi.abs()),
+                }
+            });
+            let least = least.fold(0.0, f64::max);
+            let size = |part: &Interval| part.lo.abs().max(part.hi.abs());
+            let most = taken.iter().map(|(part, _)| size(part)).fold(0.0, f64::max);
+            // What is largest may be any that comes so far.
+            let mut rate: Option<Interval> = None;
+            for (part, change) in taken.iter().filter(|(part, _)| size(part) >= least) {
+                for (is_there, way) in [(part.hi >= 0.0, -1.0), (part.lo <= 0.0, 1.0)] {
+                    if is_there {
+                        let own = change.scaled(way);
+                        rate = Some(rate.map_or(own, |known| known.joined(own)));
+                    }
+                }
+            }
+            let value = Interval::hull(1.0 - most, 1.0 - least);
+            let rate = rate.unwrap_or(Interval::ALL);
+            for &row in rows {
+                found[row] = Some(Enclosure { value, rate });
+            }
+        }
+        found
+    }
+
+    /// -N^-1 g for all g within these bounds; `None` if one of them is not finite. Those of contacts that share loads are not known.
     fn changes(&self, g: &[Interval]) -> Option<IntervalVector> {
         if !g.iter().all(|g| g.is_bounded()) {
             return None;
+        }
+        if self.regular.len() < g.len() {
+            let own: IntervalVector = self.regular.iter().map(|&row| g[row]).collect();
+            let mut all = IntervalVector::from_elem(Interval::ALL, g.len());
+            let found = self.own_changes(&own);
+            self.regular
+                .iter()
+                .zip(found)
+                .for_each(|(&row, found)| all[row] = found);
+            return Some(all);
+        }
+        Some(self.own_changes(g))
+    }
+
+    fn own_changes(&self, g: &[Interval]) -> IntervalVector {
+        if g.is_empty() {
+            return IntervalVector::new();
         }
         let mut middles: Rates = g.iter().map(|g| 0.5 * (g.lo + g.hi)).collect();
         let mut radii: Rates = g.iter().map(|g| 0.5 * (g.hi - g.lo)).collect();
@@ -146,7 +241,7 @@ impl AffineBounds {
         let pairs = middles.iter().zip(&radii);
         let around =
             |(m, r): (&f64, &f64)| Interval::around(-m, r.abs() * (1.0 + 1e-10) + rounding);
-        Some(pairs.map(around).collect())
+        pairs.map(around).collect()
     }
 }
 

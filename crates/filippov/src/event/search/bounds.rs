@@ -166,6 +166,7 @@ impl BoundedCurve<'_> {
                     multipliers: found.values,
                     rates: found.rates,
                     diagonal: IntervalVector::new(),
+                    reserves: found.reserves,
                 })
             }));
         }
@@ -232,6 +233,9 @@ fn exit_bound(guard: Guard, sliding: &[usize], root: &EnclosedRoot) -> Option<En
     let value = match guard {
         Guard::Multiplier { surface, end } => {
             let position = sliding.binary_search(&surface).ok()?;
+            if let Some(reserve) = root.reserves.get(position).copied().flatten() {
+                return Some(reserve);
+            }
             if let Some(bounds) = root.rates.get(position) {
                 rate = bounds.scaled(-f64::from(end));
             }
