@@ -50,10 +50,7 @@ impl Graph {
         let values = own.blended(&values, &all)?;
         let (roots, functions) = values.split_at(roots.len());
         let mut graph = Graph::new();
-        // A width is positive: with another one nothing is a number, and a run says so.
-        let root = graph.parameter(eps);
-        let root = graph.unary(UnaryOp::Sqrt, root);
-        let eps = graph.mul(root, root);
+        let eps = graph.parameter(eps);
         let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
         let mut signs: FxHashMap<u32, NodeId> = FxHashMap::default();
         // A switching function may have a larger number than the sign that it decides.
