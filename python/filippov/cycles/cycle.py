@@ -39,7 +39,7 @@ from filippov.system import System
 __all__ = ["Cycle", "CycleDerivative", "cycle_at", "cycle_of", "in_parts", "limit_cycle", "turns_of"]
 
 _MOST_RETURNS, _PHASES = 32, 16
-_NEAR = 1e-3
+_NEAR, _SAME = 1e-3, 1e-6
 # So many itineraries are tried, each from a run beside the cycle that the one before leads to.
 _MOST_ITINERARIES = 5
 # The first run of a search is that short: how fast a system is shows in its steps.
@@ -858,6 +858,9 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
         start = cycle.at(t0 + turns * period, before=True)
         return cycle_at(motions, t0, start, period, forcing, is_free=True)
     if is_timed:
+        moved = _by_run(cycle, (inner, t, x), t0)
+        if moved is not None:
+            return moved
         at = cycle.t0 + (t0 - cycle.t0) % period
         return cycle_of(motions, cycle.itinerary.from_place(at, cycle.at(at)).from_time(t0), forcing)
     assert isinstance(section, Event)
@@ -868,6 +871,20 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     moved = cycle_of(motions, cycle.itinerary.from_place(at, cycle.at(at)), forcing)
     moved._section = section.g
     return moved
+
+
+def _by_run(cycle: Cycle, start: tuple[Motions, float, Array], t0: float) -> Cycle | None:
+    """Return a forced cycle from a phase, with the pieces of a run from inside; None if the run leaves it."""
+    (motions, t, x), period = start, cycle.period
+    at = t0 + float(np.ceil((t - t0) / period - 1e-9)) * period
+    try:
+        itinerary = itinerary_of(motions.record((t, t + 2.3 * period), x), at, at + period)
+        moved = cycle_of(motions, itinerary.from_time(t0), cycle._shooting.period)
+    except ModelError:
+        return None
+    known = cycle.at(at)
+    is_same = np.max(np.abs(moved.y0 - known)) <= _SAME * max(1e-300, float(np.max(np.abs(known))))
+    return moved if is_same else None
 
 
 def _counts_time(cycle: Cycle) -> bool:

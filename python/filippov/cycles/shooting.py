@@ -32,7 +32,7 @@ _GROWTH, _GROWTH_OF_PARTS = 1e3, 30.0
 _ABSURD, _LONG_BY_ROUNDING, _ROUNDING, _SINGULAR = 1e3, 1e-7, 1e-13, 1e-10
 _SOLVED = 1e-11
 # No symmetry of a cycle brings a state back to its value at the start at both of these shares of a leg.
-_SHARES = (0.236068, 0.5)
+_SHARES, _MIDDLE = (0.236068, 0.5), (0.5,)
 # A leg that vanishes may last for less than nothing by rounding.
 _NOTHING = 1e-11
 # A state that is such a part of the largest one is at zero.
@@ -187,14 +187,14 @@ class Shooting:
 
     @cached_property
     def swing(self) -> Array:
-        """The largest change of each state along a leg in the guess, (n,)."""
-        return self._swing_at(self.unknowns(self._guess))
+        """The largest change of each state from the start to the middle of a leg in the guess, (n,)."""
+        return self._swing_at(self.unknowns(self._guess), _MIDDLE)
 
-    def _swing_at(self, u: Array) -> Array:
+    def _swing_at(self, u: Array, shares: tuple[float, ...]) -> Array:
         starts, durations, t = self.parts(u)
         found = np.zeros(self.n)
         for leg, x, duration in zip(self.legs, starts, durations, strict=True):
-            for share in _SHARES:
+            for share in shares:
                 inside = self.motions.leg(leg.mode, leg.discrete, t, x, share * duration)
                 found = np.maximum(found, np.abs(inside - x))
             t += duration
@@ -208,7 +208,9 @@ class Shooting:
         self._reference = u[: self.n].copy()
         velocity = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
         # Across the velocity, each state measured by its changes: in all units of states and of time.
-        self._normal = velocity / np.maximum(self._swing_at(u), _AT_ZERO * scales(self, u)[: self.n]) ** 2
+        self._normal = (
+            velocity / np.maximum(self._swing_at(u, _SHARES), _AT_ZERO * scales(self, u)[: self.n]) ** 2
+        )
 
     def plane(self) -> Array | None:
         """Return the normal of the plane in which a cycle starts that starts at no event."""
