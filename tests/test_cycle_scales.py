@@ -195,7 +195,7 @@ def test_a_branch_in_other_units(length: float, time: float) -> None:
 
 @pytest.mark.parametrize("unit", [1e-6, 1e-3, 1.0, 1e6])
 def test_units_of_time_do_not_change_a_branch_without_switches(unit: float) -> None:
-    # The band of Roessler, with a velocity in the place of the second state.
+    # We take Roessler's band, and use a velocity as its second state.
     def band(t: Any, x: Any, c: float = 2.5) -> list[Any]:
         a, b, z = x[0], x[1] * unit, x[2]
         return [(-b - z) / unit, (a + 0.2 * b) / unit**2, (0.2 + z * (a - c)) / unit]

@@ -642,8 +642,8 @@ def test_derivatives_of_a_black_box_advise_only_what_helps() -> None:
 
 @pytest.mark.parametrize("end", [2.5, 6.0, 20.0])
 def test_at_a_level_that_nothing_leaves(end: float) -> None:
-    # A buffer that is empty: beyond its surface the motion goes along that everywhere, and not at one place.
-    # It is left where the rate changes its sign, and not where a multiplier tells.
+    # While the buffer is empty, the field on the other side of its surface is zero everywhere.
+    # The motion leaves the surface when the rate changes sign. The multiplier does not tell that time.
     def buffer(t: float, x: Any, a: float = 1.0, b: float = 0.3) -> list[Any]:
         rate = b - a * np.sin(t)
         return [rate if x[0] > 0 else max(rate, 0), np.sin(x[0]) - b * x[1]]

@@ -227,7 +227,7 @@ class Cycle:
         return self._from_inside()[1:]
 
     def _from_inside(self) -> tuple[Motions, float, Array]:
-        """Return the same, behind motions whose named discrete states begin as they are there."""
+        """Return motions whose named discrete states begin as they are inside, the time, and the state."""
         itinerary, motions = self.itinerary, self._shooting.motions
         lost = [_codimension(motions, leg) for leg in itinerary.legs]
         # Durations are rounded, so that pieces of the same length compare as equal.
@@ -444,6 +444,12 @@ def limit_cycle(
     ModelError
         If there is no cycle, or it is not found; the message says why.
 
+    Notes
+    -----
+    Named discrete states keep what the run has set; ``cycle.params`` has their values at the start of the
+    cycle. In a system without forcing, a relay with a memory begins anew with ``initial`` in each stretch of the
+    search; if this starts between the thresholds, give the relay the value that it has on the cycle.
+
     References
     ----------
     Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008)
@@ -537,7 +543,7 @@ def _cycle_beside(
             )
         if is_free or found.is_admissible:
             break
-        # The flow takes other pieces there.
+        # The flow does not follow these pieces: we take those of a run from inside this cycle.
         motions, t0, x = found._from_inside()
     assert found is not None
     return found
@@ -874,7 +880,11 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
 
 
 def _by_run(cycle: Cycle, start: tuple[Motions, float, Array], t0: float) -> Cycle | None:
-    """Return a forced cycle from a phase, with the pieces of a run from inside; None if the run leaves it."""
+    """Return a forced cycle from a phase, with the pieces of a run from inside; None if the run leaves it.
+
+    Where the equations are nearly singular, the special points of a branch depend on the rounding of its start;
+    those in the tests are found from a start by a run.
+    """
     (motions, t, x), period = start, cycle.period
     at = t0 + float(np.ceil((t - t0) / period - 1e-9)) * period
     try:

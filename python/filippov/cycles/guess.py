@@ -11,13 +11,14 @@ from filippov.errors import ModelError
 
 __all__ = ["better_guess"]
 
-# From the first Newton's method with a given itinerary can go on; a run of two periods needs the second.
+# Newton's method with a given itinerary can start from a gap of the first size. A run of two periods needs
+# the second, since the gap grows in it.
 _NEAR, _CLOSED = 1e-6, 1e-10
 _MOST_STEPS, _MOST_HALVINGS = 25, 10
-# A step of such a share of a Newton step shortens the gap by a share of its own (Armijo).
+# We accept a part s of a Newton step if it shortens the gap by at least 0.3 s of its length (Armijo).
 _ENOUGH = 0.3
 _SINGULAR = 1e-12
-# A motion that has become so small beside the guess comes to rest.
+# A motion that moves so little beside the guess counts as rest.
 _RESTS = 1e-3
 
 

@@ -36,7 +36,7 @@ pub struct SharedLoad {
     pub reserves: Vec<Option<f64>>,
 }
 
-/// The surfaces of a loop, and for each direction the factors of their nu.
+/// The surfaces of a loop, and for each facet the factors by which their nu count.
 pub type PartsTaken = (Vec<usize>, Vec<Vec<f64>>);
 
 /// What the multipliers of surfaces follow from, for one N.
@@ -93,8 +93,8 @@ impl SharedLoads {
         &self.regular
     }
 
-    /// The parts of the strength of each loop that a load takes in all directions, as sums of nu: of each the surfaces, and the factors
-    /// of the nu of these. The reserve is one less the largest of their sizes. `None` if too many contacts share one load.
+    /// For each loop, the parts of its strength that a load takes. Each part belongs to a facet and is a sum over the surfaces of the loop
+    /// of a factor times nu. The reserve of the loop is one minus the largest size of a part. `None` if too many contacts share one load.
     pub fn parts_taken(&self) -> Option<Vec<PartsTaken>> {
         let parts = self.loops.iter().map(Loop::parts_taken);
         parts.collect()

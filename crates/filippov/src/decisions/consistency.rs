@@ -273,7 +273,7 @@ pub(crate) fn differs_between_sides(
             let h = |pattern: usize| values[n * pattern + k];
             let beyond = -h(pattern) * f64::from(side.entries()[k]);
             let size = system.surface_size(k, &place)?;
-            // What is beyond on all sides is so by the rounding of its event.
+            // If the value lies beyond the surface on every side, the rounding of the event put it there.
             let differs = |other: usize| (h(other) - h(pattern)).abs() > DOUBTFUL * beyond;
             if beyond > DOUBTFUL * (1.0 + size) && (0..patterns).any(differs) {
                 return Ok(Some(Stop::SlidesAcrossJump {

@@ -339,8 +339,8 @@ impl Instant<'_, '_> {
         for guard in others {
             let own = match guard {
                 Guard::Surface(_) => self.before.gradient_of(guard, t, &z)?,
-                // Sliding on a surface ends where the field of the side that it is left to becomes tangent to it; its multiplier may be
-                // a quotient of two functions that vanish.
+                // Sliding ends when the field on the side where the motion leaves becomes tangent to the surface. We use the rate of
+                // that field, since the multiplier may be a quotient of two functions that vanish.
                 Guard::Multiplier { surface, end }
                     if self.before.sliding[..] == [surface]
                         && self.record.mode[1].entries()[surface] == end

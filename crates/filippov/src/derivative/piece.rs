@@ -683,7 +683,7 @@ impl<'a> Piece<'a> {
         let Some((by_time, slopes)) = slopes else {
             return Ok(false);
         };
-        // Beyond the surface the motion goes along it everywhere, as at a level that nothing leaves.
+        // The multiplier is at its end for all motions beside this one too: the field on that side is tangent to the surface everywhere.
         if by_time == 0.0 && slopes.iter().all(|slope| *slope == 0.0) {
             return Ok(false);
         }

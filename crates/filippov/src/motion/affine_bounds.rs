@@ -31,8 +31,9 @@ pub struct AffineBounds {
     matrix: SparseRows,
     /// Contacts whose sign acts on no other rate, and whose rate no other sign acts on.
     is_uncoupled: Vec<bool>,
-    /// Those with multipliers of their own; the others share loads.
+    /// The contacts that have multipliers of their own.
     regular: Vec<usize>,
+    /// The other contacts, which share loads.
     loops: Vec<PartsTaken>,
     normal: RefCell<SparseSolver>,
     /// None where N is diagonal, as `<N>` is N then but for signs.
@@ -151,8 +152,8 @@ impl AffineBounds {
         })
     }
 
-    /// What is left of the strength of contacts that share a load, from bounds of the rates at the multipliers `near`, and of what
-    /// these do in time.
+    /// Bounds of the reserves of contacts that share a load, with their rates of change. `values` bounds the rates of the switching
+    /// functions at the multipliers `near`, and `rates` bounds the time derivatives of these.
     fn reserves(
         &self,
         values: &[Interval],
@@ -178,7 +179,7 @@ impl AffineBounds {
                 (part, sum(factors, &|row| rates[row], rows))
             });
             let taken: Vec<(Interval, Interval)> = taken.collect();
-            // The largest part at least, and at most.
+            // The largest part lies between `least` and `most`.
             let least = taken.iter().map(|(part, _)| {
                 let is_around_zero = part.lo <= 0.0 && part.hi >= 0.0;
                 match is_around_zero {
@@ -189,7 +190,7 @@ impl AffineBounds {
             let least = least.fold(0.0, f64::max);
             let size = |part: &Interval| part.lo.abs().max(part.hi.abs());
             let most = taken.iter().map(|(part, _)| size(part)).fold(0.0, f64::max);
-            // What is largest may be any that comes so far.
+            // Any part that may reach `least` may be the largest one.
             let mut rate: Option<Interval> = None;
             for (part, change) in taken.iter().filter(|(part, _)| size(part) >= least) {
                 for (is_there, way) in [(part.hi >= 0.0, -1.0), (part.lo <= 0.0, 1.0)] {
@@ -199,7 +200,8 @@ impl AffineBounds {
                     }
                 }
             }
-            let value = Interval::hull(1.0 - most, 1.0 - least);
+            let rounding = rounding_beside(most);
+            let value = Interval::hull(1.0 - most - rounding, 1.0 - least + rounding);
             let rate = rate.unwrap_or(Interval::ALL);
             for &row in rows {
                 found[row] = Some(Enclosure { value, rate });
@@ -236,13 +238,17 @@ impl AffineBounds {
         let comparison = self.comparison.as_ref().unwrap_or(&self.normal);
         comparison.borrow_mut().solve(&mut radii);
         let largest = middles.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        // A rounding error per unknown and operation, many times over.
-        let rounding = 1e-12 + 1e-10 * largest;
+        let rounding = rounding_beside(largest);
         let pairs = middles.iter().zip(&radii);
         let around =
             |(m, r): (&f64, &f64)| Interval::around(-m, r.abs() * (1.0 + 1e-10) + rounding);
         pairs.map(around).collect()
     }
+}
+
+/// A rounding error per unknown and operation, many times over, of numbers up to this size.
+fn rounding_beside(largest: f64) -> f64 {
+    1e-12 + 1e-10 * largest
 }
 
 fn uncoupled(matrix: &SparseRows) -> Vec<bool> {
