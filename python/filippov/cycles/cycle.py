@@ -447,8 +447,8 @@ def limit_cycle(
     Notes
     -----
     Named discrete states keep what the run has set; ``cycle.params`` has their values at the start of the
-    cycle. In a system without forcing, a relay with a memory begins anew with ``initial`` in each stretch of the
-    search; if this starts between the thresholds, give the relay the value that it has on the cycle.
+    cycle. In a system without forcing, a relay with a memory begins anew with ``initial`` in each stretch of
+    the search. If a stretch starts between the thresholds, give the relay the value that it has on the cycle.
 
     References
     ----------
@@ -882,8 +882,8 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
 def _by_run(cycle: Cycle, start: tuple[Motions, float, Array], t0: float) -> Cycle | None:
     """Return a forced cycle from a phase, with the pieces of a run from inside; None if the run leaves it.
 
-    Where the equations are nearly singular, the special points of a branch depend on the rounding of its start;
-    those in the tests are found from a start by a run.
+    Where the equations are nearly singular, the special points of a branch depend on the rounding of its
+    start. Those in the tests are found from a start by a run.
     """
     (motions, t, x), period = start, cycle.period
     at = t0 + float(np.ceil((t - t0) / period - 1e-9)) * period
