@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from filippov.problems import drill_string
 from reference import DATA
+from scipy.linalg import expm
+from scipy.optimize import brentq
 from statements import cases, numbers, system_of, wall
 
 CYCLES = cases("K1_cycles")
@@ -515,6 +517,33 @@ def test_cycles_keep_the_memory_of_a_relay(force: float, omega: float, initial: 
     cycle = fl.limit_cycle(system, [1.0, 0.5], period=period)
     run = system.solve((0, 60 * period), [1.0, 0.5], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(cycle.y0, run.y[:, -1], atol=1e-7)
+
+
+@pytest.mark.parametrize("force", [0.1, 0.11, 0.12, 0.2])
+@pytest.mark.parametrize("initial", [1, -1])
+@pytest.mark.parametrize("start", [[1.0, 0.5], [-0.9, 0.1]])
+def test_the_search_goes_on_with_the_memory_of_a_relay(
+    force: float, initial: int, start: list[float]
+) -> None:
+    """Each stretch began with `initial`, and between the thresholds the search said that the run rests.
+
+    Half a period moves z, where the relay changes to -1, to -z. With E = exp(A T / 2) that is
+    (1 + E) z = (E - 1) (force, 0).
+    """
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.3, 0.3, initial=initial)
+    system = fl.System(lambda t, x: [x[1], -x[0] - force * relay(t, x) - 0.3 * x[1]], n=2)
+    a, one = np.array([[0.0, 1.0], [-1.0, -0.3]]), np.eye(2)
+
+    def switch(half: float) -> Any:
+        e = expm(a * half)
+        return np.linalg.solve(one + e, (e - one) @ [force, 0.0])
+
+    half = brentq(lambda half: switch(half)[0] + 0.3, 2.0, 3.1, xtol=1e-14)
+    cycle = fl.limit_cycle(system, start)
+    assert abs(cycle.period - 2 * half) < 1e-10
+    np.testing.assert_allclose(cycle.solution.y[:, -1], cycle.y0, atol=1e-9)
+    # Its halves are alike, and it starts at one of the two switches.
+    np.testing.assert_allclose(cycle.y0 * -np.sign(cycle.y0[0]), switch(half), atol=1e-9)
 
 
 def test_cycles_keep_discrete_states() -> None:

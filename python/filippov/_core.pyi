@@ -355,6 +355,7 @@ def solve(
     events: list[tuple[Callable[[float, _Array], float] | TracedEvent, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]] = ...,
     wrt: tuple[list[tuple[int, int]], list[int], int, int | None] | None = None,
+    before: Sequence[float] | None = None,
 ) -> Run: ...
 def solve_many(
     runs: Runs,

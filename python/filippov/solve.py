@@ -291,12 +291,20 @@ def solve_prepared(
 
 
 def solve_quietly(
-    system: System, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float], options: Mapping[str, Any]
+    system: System,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    params: Mapping[str, float],
+    options: Mapping[str, Any],
+    before: Sequence[float] | None = None,
 ) -> Solution:
-    """Solve as `solve_ivp` does, and show no warnings; for the runs of an analysis."""
+    """Solve as `solve_ivp` does, and show no warnings; for the runs of an analysis.
+
+    A run that goes on from another one begins with the discrete states `before`, all that the system has.
+    """
     others = dict(options)
     events = others.pop("events", None)
-    return _solve(system, t_span, y0, _changed(others), events, None, params, None, None)
+    return _solve(system, t_span, y0, _changed(others), events, None, params, None, None, before)
 
 
 def _key_of(options: Mapping[str, Any], specs: list[EventSpec] | None) -> Hashable | None:
@@ -383,6 +391,7 @@ def _solve(
     params: Mapping[str, float] | None,
     surfaces: Any,
     resets: Any,
+    before: Sequence[float] | None = None,
 ) -> Solution:
     """Solve with the options that differ from their defaults; all arguments as in `solve_ivp`."""
     t0, t1 = check_t_span(t_span)
@@ -413,7 +422,7 @@ def _solve(
     def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> tuple[AnyRun, Prepared]:
         start, forward = (t0, system) if t1 >= t0 else (-t0, None)
         used, found = core_events(specs or [], forward, prepared, start, state, constants, values)
-        return _run(used, t0, t1, state, values, options, found, choices, wanted), used
+        return _run(used, t0, t1, state, values, options, found, choices, wanted, before), used
 
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run, used = run_of(prepared, choices)
@@ -575,6 +584,7 @@ def _run(
     events: list[CoreEvent],
     choices: tuple[Mode, ...],
     wanted: Wanted | None,
+    before: Sequence[float] | None,
 ) -> AnyRun:
     p = parameter_vector(values)
     if t1 == t0:
@@ -582,7 +592,9 @@ def _run(
     if t1 > t0:
         core_options = options.for_core(choices)
         asked = None if wanted is None else wanted.for_core()
-        return run_core(prepared.core, t0, t1, y0, p, core_options, events, list(prepared.actions), asked)
+        return run_core(
+            prepared.core, t0, t1, y0, p, core_options, events, list(prepared.actions), asked, before
+        )
     if options.t_eval is not None:
         options = options._replace(t_eval=-options.t_eval)
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))

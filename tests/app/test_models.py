@@ -214,6 +214,16 @@ def test_the_kernel_finds_the_cycle_on_the_screen() -> None:
     assert reply.header["text"] == f"A stable forced cycle of period 15.708 through the modes {modes}."
 
 
+@pytest.mark.parametrize("initial", [1, -1])
+def test_the_cycle_on_the_screen_keeps_the_memory_of_a_relay(initial: int) -> None:
+    relay = fl.Hysteresis(lambda t, x: x[0], -0.3, 0.3, initial=initial)
+    system = fl.System(lambda t, x: [x[1], -x[0] - 0.2 * relay(t, x) - 0.3 * x[1]], n=2)
+    reply = asked(Engine(make_page(system, [1.0, 0.5])), "cycle")
+    y = reply.arrays["y"]
+    np.testing.assert_allclose(y[-1], y[0], atol=1e-6)
+    assert np.ptp(y[:, 0]) > 0.8
+
+
 def test_the_kernel_continues_the_cycle() -> None:
     page = make_page(FRICTION, [1.0, 2.0], (0, 40), {"omega": 0.4})
     reply = asked(Engine(page), "continuation", parameter="omega", range=[0.38, 0.42])

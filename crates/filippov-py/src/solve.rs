@@ -35,9 +35,10 @@ impl RunOptions {
     }
 }
 
-/// Integrates a system; `filippov.solve_ivp` checks the arguments before.
+/// Integrates a system; `filippov.solve_ivp` checks the arguments before. Where another motion ends at the start, `before` is what it
+/// has left in the discrete states.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new(), wrt=None))]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new(), wrt=None, before=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve(
     py: Python<'_>,
@@ -50,9 +51,13 @@ pub fn solve(
     events: Vec<EventRow>,
     actions: Vec<ActionRow>,
     wrt: Option<Wanted>,
+    before: Option<Vec<f64>>,
 ) -> PyResult<Run> {
     let (y0, p) = (y0.as_slice()?.to_vec(), p.as_slice()?.to_vec());
-    let prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
+    let mut prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
+    if let Some(before) = before {
+        prepared = prepared.going_on(t0, &before)?;
+    }
     let RunOptions { options, progress } = options;
     let extension = extension_of(&system, wrt.as_ref())?;
     let wanted = extension.as_ref().zip(wrt.as_ref());

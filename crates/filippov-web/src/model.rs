@@ -213,13 +213,21 @@ impl Model {
         self.source.ready(params, t, x)
     }
 
-    pub(crate) fn going_on(
+    /// Lets a run at (t, x) begin with the discrete states that another one has left.
+    ///
+    /// # Errors
+    /// If a function of the model fails.
+    pub(crate) fn go_on(
         &self,
+        actions: &mut Actions<'_>,
         params: &[f64],
         at: (f64, &[f64]),
         before: &[f64],
-    ) -> Result<Option<Vec<f64>>, Refusal> {
-        self.source.going_on(params, at, before)
+    ) -> Result<(), Refusal> {
+        if let Some(found) = self.source.going_on(params, at, before)? {
+            actions.discrete = found;
+        }
+        Ok(())
     }
 }
 

@@ -125,12 +125,13 @@ class Engine:
 
     def _cycle(self, given: Mapping[str, Any]) -> Reply:
         found = self._found_cycle(given)
-        t0, start = found.inside()
+        motions, t0, start = found._from_inside()
         request = {
             "kind": "run",
             "y0": start.tolist(),
             "t_span": [t0, t0 + found.period],
             "params": found.params,
+            "memory": list(motions.before or ()),
             "rtol": min(self.page.rtol, 1e-8),
             "atol": min(self.page.atol, 1e-10),
         }

@@ -161,7 +161,7 @@ class Cycle:
         # A run does what is to be done at its first time.
         is_timed = ending is not None and ending.guard is None
         start = self.at(self.t0, before=True) if is_timed else self.y0
-        return self._shooting.motions.run((self.t0, self.t0 + self.period), start)
+        return self._motions_at(self.t0).run((self.t0, self.t0 + self.period), start)
 
     @cached_property
     def is_admissible(self) -> bool:
@@ -227,7 +227,7 @@ class Cycle:
         return self._from_inside()[1:]
 
     def _from_inside(self) -> tuple[Motions, float, Array]:
-        """Return motions whose named discrete states begin as they are inside, the time, and the state."""
+        """Return motions whose discrete states begin as they are inside, the time, and the state."""
         itinerary, motions = self.itinerary, self._shooting.motions
         lost = [_codimension(motions, leg) for leg in itinerary.legs]
         # Durations are rounded, so that pieces of the same length compare as equal.
@@ -235,9 +235,15 @@ class Cycle:
         ranked = zip(lost, shares, strict=True)
         place = min(range(len(lost)), key=list(ranked).__getitem__)
         t = self.t0 + sum(itinerary.durations[:place]) + 0.5 * itinerary.durations[place]
-        own = motions.copy()
-        own.begin_with(itinerary.legs[place].discrete)
-        return own, t, self.at(t)
+        return self._motions_at(t), t, self.at(t)
+
+    def _motions_at(self, t: float) -> Motions:
+        """Return motions whose discrete states begin as they are at a time, modulo the period."""
+        ends = np.cumsum(self.itinerary.durations)[:-1]
+        leg = int(np.searchsorted(ends, (t - self.t0) % self.period, side="right"))
+        own = self._shooting.motions.copy()
+        own.begin_with(self.itinerary.legs[leg].discrete)
+        return own
 
     def derivative(self, name: str) -> CycleDerivative:
         """Return the derivative by a parameter.
@@ -447,8 +453,7 @@ def limit_cycle(
     Notes
     -----
     Named discrete states keep what the run has set; ``cycle.params`` has their values at the start of the
-    cycle. In a system without forcing, a relay with a memory begins anew with ``initial`` in each stretch of
-    the search. If a stretch starts between the thresholds, give the relay the value that it has on the cycle.
+    cycle. A relay with a memory goes on as the run has left it, too.
 
     References
     ----------

@@ -146,6 +146,8 @@ class Motions:
         self._checked: Options = check_options(self.options, (0.0, 1.0), n)
         self._by = tuple(by)
         self._held: HeldMotions | None = None
+        # The discrete states with which runs begin; None as at any start.
+        self.before: tuple[float, ...] | None = None
         # Those of all runs; copies add to the same list.
         self.warnings: list[RunWarning] = []
         # States of the problem, a row for each.
@@ -162,11 +164,13 @@ class Motions:
             "by": self._by,
             "options": self.options,
             "seen": self.seen,
+            "before": self.before,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        seen = state.pop("seen", None)
+        seen, before = state.pop("seen", None), state.pop("before", None)
         self.__init__(**state)  # type: ignore[misc]
+        self.before = before
         if seen is not None:
             self.seen = seen
 
@@ -214,14 +218,14 @@ class Motions:
         self._guards: dict[tuple[Mode, tuple[float, ...]], list[Guard]] = {}
 
     def begin_with(self, q: Sequence[float]) -> None:
-        """Let runs begin with these values of the named discrete states, which are the first of all."""
-        names = self.system.discrete
+        """Let runs begin with these discrete states, the named ones first."""
+        names, self.before = self.system.discrete, tuple(map(float, q))
         if names:
-            self.use({**self._params, **dict(zip(names, map(float, q), strict=False))})
+            self.use({**self._params, **dict(zip(names, self.before, strict=False))})
 
     def begin_as(self, solution: Solution, t: float) -> None:
-        """Let runs begin with what the named discrete states are at a time of a run."""
-        n = len(self.system.discrete)
+        """Let runs begin with what the discrete states are at a time of a run."""
+        n = len(self._core.laws())
         if n and isinstance(solution._run, Run):
             self.begin_with(solution._run.discrete(np.array([t]), n, False)[:, 0].tolist())
 
@@ -298,7 +302,8 @@ class Motions:
         """Run the system with these parameters."""
         if self.watched:
             options["progress"] = Report(print_progress(t_span, self.watched, _PATIENCE))
-        found = solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
+        own = {**self.options, **options}
+        found = solve_quietly(self.system, t_span, x, self._params, own, self.before)
         self.warnings += (w for w in found.warnings if w.code not in _OF_DERIVATIVES)
         return found
 

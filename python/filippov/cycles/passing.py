@@ -83,7 +83,8 @@ def flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
     motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
     forcing = shooting.period
     try:
-        t, x = _middle(curve, w)
+        _, t, x, discrete = max(_middles(curve, w), key=lambda row: row[0])
+        motions.begin_with(discrete)
         duration = sum(shooting.parts(w[: curve.n_unknowns])[1])
         if forcing is not None:
             duration = forcing.value(motions)
@@ -98,13 +99,8 @@ def flow_near(curve: CycleCurve, w: Array) -> Cycle | None:
     return found if turns_of(found, most) == 1 else None
 
 
-def _middle(curve: CycleCurve, w: Array) -> tuple[float, Array]:
-    """Return a time and the state in the middle of the longest leg."""
-    return max(_middles(curve, w), key=lambda row: row[0])[1:]
-
-
-def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
-    """Return how long each leg lasts, the time of its middle, and the state there."""
+def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array, tuple[float, ...]]]:
+    """Return how long each leg lasts, the time of its middle, the state there, and its discrete states."""
     shooting = curve.shooting
     motions = shooting.motions.with_derivatives_by(())
     motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
@@ -112,7 +108,8 @@ def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array]]:
     found = []
     for leg, start, duration in zip(shooting.legs, starts, durations, strict=True):
         half = 0.5 * duration
-        found.append((duration, t + half, motions.leg(leg.mode, leg.discrete, t, start, half)))
+        middle = motions.leg(leg.mode, leg.discrete, t, start, half)
+        found.append((duration, t + half, middle, leg.discrete))
         t += duration
     return found
 
@@ -123,9 +120,9 @@ def distance_from(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
     points = np.array([cycle.at(cycle.t0 + cycle.period * phase) for phase in phases])
     size = np.ptp(points, axis=0) + 1e-300
     middles = _middles(curve, w)
-    period = sum(duration for duration, _, _ in middles)
+    period = sum(duration for duration, *_ in middles)
     found = 0.0
-    for duration, t, x in middles:
+    for duration, t, x, _ in middles:
         if duration < SHORT * period:
             continue
         if cycle.is_forced:

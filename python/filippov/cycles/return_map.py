@@ -34,7 +34,7 @@ class ReturnMap:
     """
 
     def __init__(self, cycle: Cycle) -> None:
-        self.motions, self.period = cycle._shooting.motions, cycle.period
+        self.period = cycle.period
         if cycle.is_forced:
             self.t0 = self.period * float(np.ceil(cycle.t0 / self.period - 1e-9))
         else:
@@ -42,7 +42,7 @@ class ReturnMap:
             longest = int(np.argmax(legs))
             self.t0 = cycle.t0 + sum(legs[:longest]) + 0.5 * legs[longest]
         self.is_forced = cycle.is_forced
-        x = cycle.at(self.t0)
+        self.motions, x = cycle._motions_at(self.t0), cycle.at(self.t0)
         self.cycle = cycle_at(self.motions, self.t0, x, self.period, cycle._shooting.period, is_free=True)
         self.point = self.cycle.y0
         self.velocity = self.cycle._shot.passages[0].velocities[0]

@@ -51,8 +51,7 @@ pub fn diagram(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         let ready = model.ready(&params, from, &start)?;
         let (system, mut actions) = (ready.system(), ready.actions());
         if let Some(before) = &memory {
-            let found = model.going_on(&params, (from, &start), before)?;
-            actions.discrete = found.unwrap_or(actions.discrete);
+            model.go_on(&mut actions, &params, (from, &start), before)?;
         }
         let solution = Problem::new(system, (from, from + span), &start)
             .options(&wanted.options)

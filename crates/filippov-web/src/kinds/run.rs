@@ -21,7 +21,12 @@ pub fn run(model: &Model, request: &Request) -> Result<Reply, Refusal> {
         return Err(request.wrong("tolerance", "must be from 1e-9 to 1"));
     }
     let ready = model.ready(&wanted.params, wanted.t_span.0, &wanted.y0)?;
-    let (system, actions) = (ready.system(), ready.actions());
+    let (system, mut actions) = (ready.system(), ready.actions());
+    // The discrete states that another run has left.
+    if let Some(before) = request.numbers("memory")? {
+        let at = (wanted.t_span.0, &wanted.y0[..]);
+        model.go_on(&mut actions, &wanted.params, at, &before)?;
+    }
     let solution = Problem::new(system, wanted.t_span, &wanted.y0)
         .options(&wanted.options)
         .actions(&actions)

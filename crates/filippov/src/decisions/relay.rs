@@ -77,9 +77,10 @@ pub(super) fn decide_by_relay(
     }
     let is_certain = found.uniqueness != Uniqueness::Unknown;
     let is_few = surfaces.len() <= MOST_MEETING;
-    // A multiplier that starts at its end may go beyond it: germs tell.
-    let mut pairs = found.signs.iter().zip(&found.modes);
-    let starts_at_end = pairs.any(|(sign, &mode)| mode == 0 && 1.0 - sign.abs() <= AT_SIDE);
+    // A multiplier that starts at its end may go beyond it: germs tell. Contacts with a common reserve pass their load on.
+    let shares = |i: &usize| found.loops.iter().any(|contacts| contacts.contains(i));
+    let is_at_end = |i: usize| found.modes[i] == 0 && 1.0 - found.signs[i].abs() <= AT_SIDE;
+    let starts_at_end = (0..surfaces.len()).any(|i| is_at_end(i) && !shares(&i));
     let is_open = !found.degenerate.is_empty() || is_few && starts_at_end;
     if !is_certain && is_few || !is_event && is_open {
         return Ok(None);
