@@ -210,3 +210,62 @@ def test_candidates_of_entries_are_the_admissible_modes(case: dict[str, Any]) ->
     (warning,) = found
     assert expected <= set(warning.candidates)
     assert warning.candidates[0] == sol.switches[0].mode_after
+
+
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+@pytest.mark.parametrize("m", [2, 3, 6, 7, 8, 12])
+def test_sliding_ends_where_one_of_many_surfaces_begins_to_repel(m: int, method: str) -> None:
+    """Of seven and more surfaces the motion slid on, without a word; of fewer it left late at these times.
+
+    At places that a step looks at, the matrix of the multipliers was singular, and counted as that of a loop.
+    """
+
+    def field(t: float, x: Any, c: float) -> list[Any]:
+        return [np.sign(x[0]) * (t - c), *(-np.sign(x[i]) for i in range(1, m))]
+
+    for c in (0.5, 0.25, 0.75, 0.125, 0.1, 0.3137):
+        sol = fl.solve_ivp(field, (0, 1), np.zeros(m), args=(c,), nonunique="branch", method=method)
+        assert sol.branches is not None
+        ends = [path.y[0, -1] for path in sol.branches.paths()]
+        np.testing.assert_allclose(sorted(ends), [-0.5 * (1 - c) ** 2, 0.5 * (1 - c) ** 2], rtol=1e-9)
+        np.testing.assert_allclose(sol.switches.t, [c], rtol=1e-12)
+        assert sol.branches.complete
+        with pytest.raises(fl.NonUniqueError) as error:
+            fl.solve_ivp(field, (0, 1), np.zeros(m), args=(c,), nonunique="error", method=method)
+        assert error.value.t == pytest.approx(c, rel=1e-12)
+
+
+def test_seven_surfaces_that_repel_have_all_their_branches() -> None:
+    policy = fl.SlidingPolicy(max_branches=200)
+    sol = fl.solve_ivp(away, (0, 1), np.zeros(7), nonunique="branch", sliding=policy)
+    assert sol.branches is not None
+    ends = {tuple(np.round(path.y[:, -1], 12)) for path in sol.branches}
+    assert (len(sol.branches), len(ends), sol.branches.complete) == (128, 128, True)
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_surfaces_that_do_not_act_on_others_change_no_decision(seed: int) -> None:
+    """Two surfaces alone and beside six others: the rules for few surfaces, and those for groups of many."""
+    rng = np.random.default_rng(seed)
+    for k in range(25):
+        fields = rng.uniform(-1, 1, (2, 2, 2))
+        if k % 3 == 0:  # ties, tangencies
+            fields = np.round(4 * fields) / 4
+        drift = rng.uniform(-1, 1, 2) * (k % 2)
+        start = [0.0, 0.0] if k % 4 < 2 else list(rng.uniform(-0.5, 0.5, 2))
+
+        def corner(t: float, x: Any, fields: Any = fields, drift: Any = drift) -> list[Any]:
+            shares = [[(1 - np.sign(x[i])) / 2, (1 + np.sign(x[i])) / 2] for i in range(2)]
+            weights = [(a, b, shares[0][a] * shares[1][b]) for a in range(2) for b in range(2)]
+            return [sum(w * fields[a, b, i] for a, b, w in weights) + drift[i] * t for i in range(2)]
+
+        def beside(t: float, x: Any, corner: Any = corner) -> list[Any]:
+            return [*corner(t, x), *(-np.sign(x[i]) for i in range(2, 8))]
+
+        alone = fl.solve_ivp(corner, (0, 1), start, rtol=1e-10, atol=1e-12)
+        both = fl.solve_ivp(beside, (0, 1), [*start, *np.zeros(6)], rtol=1e-10, atol=1e-12)
+        assert alone.success, alone.message
+        assert both.success, both.message
+        np.testing.assert_allclose(both.y[:2, -1], alone.y[:, -1], atol=1e-8)

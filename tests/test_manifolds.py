@@ -150,6 +150,19 @@ class TestCycles:
             assert gaps.max() < 0.0401  # a hundredth of the length
             assert gaps.sum() == pytest.approx(4.0, abs=1e-9)
 
+    def test_its_last_point_is_as_accurate_as_the_others(self) -> None:
+        """It was on a chord.
+
+        x' = x / 20 + cos t, y' = x^2 / 20 - y / 10 have y = y0 + b d + d^2 / 4 with d = x - x0.
+        """
+        system = fl.System(lambda t, x: [0.05 * x[0] + np.cos(t), -0.1 * x[1] + 0.05 * x[0] ** 2], n=2)
+        cycle = fl.limit_cycle(system, [0.0, 0.5], period=2 * np.pi, transient=0)
+        x0 = -0.05 / 1.0025
+        slope = np.linalg.solve([[0.15, 1.0], [-1.0, 0.15]], [0.1 * x0, 0.1 * (0.05 * x0 + 1.0)])[0]
+        for curve in fl.manifold(cycle, length=3.0):
+            d = curve.points[0] - x0
+            np.testing.assert_allclose(curve.points[1], cycle.y0[1] + slope * d + 0.25 * d**2, atol=1e-11)
+
     def test_beyond_the_surface_the_map_leads_along_it(self, cycle: fl.Cycle) -> None:
         (curve,) = fl.manifold(cycle, length=4.0, sides=[-1])
         assert (curve.points[0] < -1.0).any()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import pickle
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from filippov.options import Options, check_options
+from scipy.interpolate import CubicSpline
 from untraced import number
 
 
@@ -116,6 +118,35 @@ def test_backward_time_without_surfaces() -> None:
     assert back.t_events is not None
     assert back.t_events[0] == pytest.approx([0.7])
     assert (back.segments[0].t_start, back.segments[-1].t_end) == (2.0, 0.0)
+
+
+def test_backward_time_traces_what_forward_time_does() -> None:
+    spline, steps = CubicSpline([0, 1, 2, 3.0], [0, 1, 0, 1.0]), [1.0, 2.0, 3.0, 4.0]
+
+    def filled(t: float, x: Any) -> Any:
+        rates = np.zeros(1)
+        rates[0] = -x[0]
+        return rates
+
+    functions: list[Any] = [
+        filled,
+        lambda t, x: [math.sin(t) - math.exp(-t) * x[0]],
+        lambda t, x: [spline(t) - float(x[0])],
+        lambda t, x: np.asarray(x, dtype=float) * 0.5,
+        lambda t, x: [steps[int(t)] - math.fmod(t, 1.0) * x[0]],
+    ]
+    for fun in functions:
+        there = fl.solve_ivp(fun, (0, 3), [0.3], rtol=1e-11, atol=1e-12)
+        back = fl.solve_ivp(fun, (3, 0), there.y[:, -1], rtol=1e-11, atol=1e-12)
+        assert back.y[0, -1] == pytest.approx(0.3, abs=1e-8)
+
+
+def test_messages_of_runs_in_backward_time_have_their_times() -> None:
+    ended = fl.solve_ivp(lambda t, x: [np.log(t - 2)], (5, 0), [0.0])
+    assert ended.message.startswith("Stopped at t = 2.0000000000 in mode")
+    assert "At t = 2.0000000000, x = " in ended.message
+    grown = fl.solve_ivp(lambda t, x: [-(x[0] ** 2)], (0, -5), [0.25])
+    assert grown.message.startswith("Stopped at t = -4.0000000")
 
 
 def test_black_box_with_surfaces() -> None:

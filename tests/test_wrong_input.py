@@ -59,6 +59,8 @@ def test_t_span(t_span: Any) -> None:
 def test_backward_time_is_refused_with_surfaces() -> None:
     with pytest.raises(fl.InputError, match=r"^t_span: .*not reversible.*x\[0\]"):
         fl.solve_ivp(relay, (1, 0), [1.0])
+    with pytest.raises(fl.InputError, match=r"^t_span: .*a relay with a memory"):
+        fl.solve_ivp(lambda t, x: [fl.hysteresis(x[0], -1, 1)], (5, 0), [0.3])
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-6, NAN, INF, "small", None, 1j])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -9,16 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run
+from filippov.events import calls_user
 from filippov.forms import Source
 
 __all__ = ["ReversedRun", "reversed_function", "reversed_source"]
 
 Array = npt.NDArray[np.float64]
 
+_TIME = re.compile(r"\bt = (-?)(?=[\d.])")
+
 
 def reversed_source(source: Source) -> Source:
     """Return the source of ``dx/ds = -f(-s, x)``; with ``s = -t`` it solves ``dx/dt = f(t, x)``."""
 
+    @calls_user
     def fun(s: Any, x: Any, *args: Any, **params: Any) -> Any:
         value = source.fun(-s, x, *args, **params)
         return [-component for component in value] if isinstance(value, (list, tuple)) else -value
@@ -28,7 +33,17 @@ def reversed_source(source: Source) -> Source:
 
 def reversed_function(g: Callable[..., Any]) -> Callable[..., Any]:
     """Return ``g(-s, x)`` as a function of ``s = -t``."""
-    return lambda s, x, *args, **params: g(-s, x, *args, **params)
+
+    @calls_user
+    def own(s: Any, x: Any, *args: Any, **params: Any) -> Any:
+        return g(-s, x, *args, **params)
+
+    return own
+
+
+def _negated(time: re.Match[str]) -> str:
+    """Return the start of a time in a message with the other sign."""
+    return "t = " + ("" if time[1] else "-")
 
 
 class ReversedRun:
@@ -53,7 +68,7 @@ class ReversedRun:
         self.y_events = run.y_events
         self.status = run.status
         self.reason = run.reason
-        self.message = run.message
+        self.message = _TIME.sub(_negated, run.message)
         self.error = run.error
         self.stats = run.stats
         self.warnings = [(0.0 - row[0], *row[1:]) for row in run.warnings]

@@ -67,7 +67,8 @@ class Branches(Sequence[Solution]):
     choices : tuple of tuple of Choice
         For each solution what it does at the points where it is not unique, in order of time.
     complete : bool
-        Whether all solutions are here; False if `max_branches` was reached.
+        Whether all solutions are here; False if `max_branches` was reached, or candidates of a point were not
+        looked for.
 
     Notes
     -----
@@ -160,7 +161,9 @@ def explore(
         solutions.append(follow(modes))
         add(solutions[-1], len(modes))
     if not pending:
-        return Branches(solutions, complete=True), None
+        # A point with one candidate may have others that were not found.
+        found = (choice for solution in solutions for choice in _choices(solution))
+        return Branches(solutions, complete=all(len(choice.candidates) > 1 for choice in found)), None
     t = pending[0][0]
     text = (
         f"max_branches = {max_branches} solutions were followed; the earliest of those left out begins here"

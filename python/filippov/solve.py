@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, RunOptions
+from filippov._core import Run, RunOptions, TracedSystem
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
@@ -569,6 +569,10 @@ def _backward(
         )
     if prepared.actions:
         raise InputError("t_span: t1 < t0 is refused for a system with resets: they cannot be undone")
+    if isinstance(prepared.core, TracedSystem) and prepared.core.relays():
+        raise InputError(
+            "t_span: t1 < t0 is refused for a system with a relay with a memory: it keeps what was before"
+        )
     if specs is not None:
         specs = [spec._replace(g=reversed_function(spec.g)) for spec in specs]
     return system.prepare_backward(len(y0), -t0, y0, values), specs

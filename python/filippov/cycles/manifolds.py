@@ -21,6 +21,7 @@ from filippov.cycles.cycle import Cycle
 from filippov.cycles.motions import Array
 from filippov.cycles.rest import Equilibrium
 from filippov.cycles.return_map import ReturnMap, Stuck
+from filippov.cycles.zero import zero_between
 from filippov.errors import InputError
 from filippov.progress import share_bar
 from filippov.scalars import positive
@@ -370,9 +371,8 @@ def _images(
                 here = image(s, k) if s < 1.0 else image(0.0, k + 1)
             except Stuck as error:
                 return _finished(side, points, done, str(error))
-            gap = float(np.linalg.norm(here - points[-1]))
+            gap, before = float(np.linalg.norm(here - points[-1])), seeds[i - 1] if i else 0.0
             if gap > largest and k > 0:
-                before = seeds[i - 1] if i else 0.0
                 if len(points) > _MOST_POINTS or len(orbits) > _MOST_POINTS:
                     return _finished(side, points, done, f"it needs more than {_MOST_POINTS} points")
                 if s - before < 1e-9:
@@ -380,7 +380,16 @@ def _images(
                 seeds.insert(i, 0.5 * (before + s))
                 continue
             if done + gap >= length:
-                points.append(points[-1] + (length - done) / gap * (here - points[-1]))
+                last, rest = points[-1], length - done
+
+                def beyond(place: float, k: int = k, last: Array = last, rest: float = rest) -> float:
+                    return float(np.linalg.norm(image(place, k) - last)) - rest
+
+                try:
+                    end = zero_between(beyond, (before, -rest), (s, gap - rest), 1e-10 * (s - before))
+                    points.append(image(end, k))
+                except Stuck as error:
+                    return _finished(side, points, done, str(error))
                 return _finished(side, points, length, f"its length is {length:g}")
             points.append(here)
             done += gap

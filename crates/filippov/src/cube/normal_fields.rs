@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use super::small_matrix::{Matrix, Vector};
 use crate::error::Undecided;
-use crate::tolerances::MOST_MEETING;
+use crate::tolerances::{MOST_MEETING, PROPORTIONAL};
 
 /// The normal components f_j^k = dh_j/dt along f^k of the m surfaces that meet, for all 2^m sign
 /// patterns k.
@@ -175,6 +175,21 @@ impl NormalFields {
     /// The largest magnitude of all components.
     pub fn size(&self) -> f64 {
         (0..self.m).fold(0.0, |size, j| self.row_size(j).max(size))
+    }
+
+    /// The surfaces in parts of which none acts on another one's rates.
+    pub fn independent_parts(&self) -> Vec<Vec<usize>> {
+        let mut acts = Matrix::zeros(self.m());
+        let sizes: Vec<f64> = (0..self.m()).map(|j| self.row_size(j)).collect();
+        for p in 0..self.m() {
+            for (j, value) in self.columns(p).flat_map(|c| c.into_iter().enumerate()) {
+                // An entry that is rounding of its row does not act.
+                if value.abs() > PROPORTIONAL * sizes[j] {
+                    (acts[(j, p)], acts[(p, j)]) = (1.0, 1.0);
+                }
+            }
+        }
+        acts.strong_parts()
     }
 
     /// The largest magnitude of the component normal to surface j.

@@ -17,6 +17,7 @@ mod event;
 mod first_order;
 mod germ;
 mod germs;
+mod groups;
 mod leave_by_rule;
 pub(crate) mod limits;
 mod meeting;

@@ -12,14 +12,14 @@ use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
 use crate::motion::SmoothField;
-use crate::sparse::SparseRows;
+use crate::sparse::{coupled_blocks, SparseRows};
 use crate::status::Stop;
 use crate::system::{dot, AffineParts};
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
 
 /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
-/// problem has certainly one solution; for many surfaces also if that is not known, with a warning. `None`
-/// otherwise.
+/// problem has certainly one solution; for many surfaces that act on one another also if that is not known, with a warning.
+/// `None` otherwise.
 ///
 /// Several surfaces may be reached and left at one instant. The problem is posed a moment later along the motion that ends
 /// where that matters: at the exit of a multiplier, where rates are zero whose multipliers are at their ends, and where
@@ -82,7 +82,12 @@ pub(super) fn decide_by_relay(
     let is_at_end = |i: usize| found.modes[i] == 0 && 1.0 - found.signs[i].abs() <= AT_SIDE;
     let starts_at_end = (0..surfaces.len()).any(|i| is_at_end(i) && !shares(&i));
     let is_open = !found.degenerate.is_empty() || is_few && starts_at_end;
-    if !is_certain && is_few || !is_event && is_open {
+    let in_small_groups = || {
+        let groups = coupled_blocks(parts.normal());
+        groups.iter().all(|(group, _)| group.len() <= MOST_MEETING)
+    };
+    // What a few surfaces may do is listed, group by group where these do not act on one another.
+    if !is_certain && (is_few || in_small_groups()) || !is_event && is_open {
         return Ok(None);
     }
     let_go(at, mode, surfaces, &mut found);

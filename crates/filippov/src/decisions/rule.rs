@@ -28,6 +28,8 @@ pub(crate) enum Rule {
     SlidingLaw,
     /// The relay problem of a field that is affine in the signs.
     Relay,
+    /// Many surfaces in groups that do not act on one another: each group by its own rules.
+    Groups,
     /// First-order data at an intersection: the attracting continuation, among several the limit of the hidden dynamics, and
     /// spirals. Germs decide where those do not.
     FirstOrder,
@@ -49,6 +51,7 @@ impl Rule {
             Rule::Germs => "germs",
             Rule::SlidingLaw => "sliding_rule",
             Rule::Relay => "relay",
+            Rule::Groups => "groups",
             Rule::FirstOrder => "first_order",
             Rule::Contact => "contact",
             Rule::Triggers => "triggers",

@@ -3,6 +3,7 @@
 use super::event::{touch, touches};
 use super::germ::{surfaces_left, Found};
 use super::germs::{decide_if_doubtful, decide_if_entangled, stay_at_limit};
+use super::groups::Groups;
 use super::leave_by_rule::leave_by_rule;
 use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
@@ -99,7 +100,18 @@ fn settle_by_rules(
     if meeting.surfaces.len() > 2 && at.patience.is_over() {
         return Ok(Decision::by(Rule::FirstOrder, Err(Stop::Interrupted)));
     }
+    let groups = Groups::of(at, notes, meeting)?;
+    if let Some(groups) = groups.as_ref().filter(|groups| groups.are_doubtful()) {
+        if let Some(decided) = by_groups(at, notes, meeting, groups)? {
+            return Ok(Decision::by(Rule::Groups, decided));
+        }
+    }
     let decided = resolve_first_order(at, notes, meeting)?;
+    if let (Err(Stop::Intersection { .. }), Some(groups)) = (&decided, &groups) {
+        if let Some(decided) = by_groups(at, notes, meeting, groups)? {
+            return Ok(Decision::by(Rule::Groups, decided));
+        }
+    }
     let decided = with_kinetic_friction(at, notes, decided, meeting)?;
     Ok(Decision::by(Rule::FirstOrder, decided))
 }
@@ -108,6 +120,32 @@ fn settle_by_rules(
 fn region(_: &Point, _: &mut Notes, meeting: &Meeting) -> Result<Option<Decided>, FieldError> {
     let is_region = meeting.surfaces.is_empty();
     Ok(is_region.then(|| Ok(Next::new(meeting.mode.clone(), Lefts::new()))))
+}
+
+/// What follows on groups of surfaces that do not act on one another; `None`, and no note of it, if one of them does not tell.
+fn by_groups(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    groups: &Groups,
+) -> Result<Option<Decided>, FieldError> {
+    let settle_group = |notes: &mut Notes, own: &Meeting| Ok(settle(at, notes, own)?.decided);
+    let mut own = notes.clone();
+    let mut decided = groups.settle(at, &mut own, &settle_group)?;
+    if let Err(Stop::Intersection { .. }) = decided {
+        notes.n_field_evaluations = own.n_field_evaluations;
+        notes.n_surface_evaluations = own.n_surface_evaluations;
+        return Ok(None);
+    }
+    *notes = own;
+    if let Some(next) = decided.as_mut().ok().filter(|next| !next.leaps()) {
+        let found = Found {
+            multipliers: next.multipliers(),
+            ..Found::default()
+        };
+        next.left = surfaces_left(at, notes, &next.mode, meeting.surfaces, found)?;
+    }
+    with_kinetic_friction(at, notes, decided, meeting).map(Some)
 }
 
 /// The motion from a place where these surfaces matter and vanish. The others have the signs of `mode`.

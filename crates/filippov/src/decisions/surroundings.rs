@@ -73,27 +73,38 @@ impl Surroundings {
 
     /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
     pub fn is_doubtful(&self) -> bool {
-        let Surroundings { fields, noise, .. } = self;
-        if fields.any_component(|i, component| component.abs() <= noise[i]) {
-            return true;
-        }
-        let m = fields.m();
-        let edges = (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern)));
-        for (slid, pattern) in edges.filter(|(i, pattern)| pattern >> i & 1 == 0) {
-            let side = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
-            let mut place: Vec<f64> = (0..m).map(side).collect();
-            let minus = fields.interpolate(&place)[slid];
-            place[slid] = 1.0;
-            let plus = fields.interpolate(&place)[slid];
-            if minus > 0.0 && plus < 0.0 {
-                place[slid] = zero_between(minus, plus);
-                let components = fields.interpolate(&place);
-                let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
-                if (0..m).any(is_tangent) {
-                    return true;
-                }
+        is_doubtful(&self.fields, &self.noise)
+    }
+
+    /// The same of some surfaces that do not act on the others, nor these on them.
+    pub fn is_doubtful_at(&self, group: &[usize]) -> bool {
+        let mut held = vec![-1; self.fields.m()];
+        group.iter().for_each(|&i| held[i] = 0);
+        let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
+        is_doubtful(&self.fields.restrict(&held), &noise)
+    }
+}
+
+fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {
+    if fields.any_component(|i, component| component.abs() <= noise[i]) {
+        return true;
+    }
+    let m = fields.m();
+    let edges = (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern)));
+    for (slid, pattern) in edges.filter(|(i, pattern)| pattern >> i & 1 == 0) {
+        let side = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+        let mut place: Vec<f64> = (0..m).map(side).collect();
+        let minus = fields.interpolate(&place)[slid];
+        place[slid] = 1.0;
+        let plus = fields.interpolate(&place)[slid];
+        if minus > 0.0 && plus < 0.0 {
+            place[slid] = zero_between(minus, plus);
+            let components = fields.interpolate(&place);
+            let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
+            if (0..m).any(is_tangent) {
+                return true;
             }
         }
-        false
     }
+    false
 }

@@ -4,7 +4,7 @@ use super::canopy::RootWatch;
 use super::ties::are_parallel;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
-use crate::sparse::SparseRows;
+use crate::sparse::{coupled_blocks, SparseRows};
 use crate::system::{AffineParts, AffineSigns, OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{MOST_MEETING, ROUNDING};
 
@@ -26,6 +26,10 @@ pub struct AffineLaw<'a> {
     sizes: Option<[f64; 2]>,
     /// The exit functions of the root that were computed last, and the values of N that they belong to.
     known_ends: Option<(Vec<f64>, [f64; 2])>,
+    /// Surfaces in groups that do not act on one another, but for those in large groups; not known before they are asked for.
+    in_small_groups: Option<Vec<usize>>,
+    /// Were the multipliers the only ones at some evaluation since the motion began?
+    was_regular: bool,
     /// No two gradients have a state in common.
     is_orthogonal: bool,
     /// The unit in which each state is moved; empty: one for all.
@@ -52,6 +56,8 @@ impl<'a> AffineLaw<'a> {
             is_orthogonal: parts.gradients.has_disjoint_rows(),
             parts,
             known_ends: None,
+            in_small_groups: None,
+            was_regular: false,
             units: Vec::new(),
             setting,
             h: vec![0.0; system.n_surfaces()],
@@ -88,6 +94,7 @@ impl<'a> AffineLaw<'a> {
         surfaces.iter().for_each(|&j| self.setting.signs[j] = 0.0);
         self.parts.restart();
         self.sizes = None;
+        self.in_small_groups = None;
         self.multipliers.fill(f64::NAN);
         self.shared = None;
         self.begin();
@@ -101,6 +108,7 @@ impl<'a> AffineLaw<'a> {
     /// A motion begins.
     pub fn begin(&mut self) {
         self.known_ends = None;
+        self.was_regular = false;
     }
 
     /// Takes over the discrete states that an action left.
@@ -118,6 +126,7 @@ impl<'a> AffineLaw<'a> {
         self.shared = None;
         if self.parts.slide(dx).is_ok() {
             self.multipliers.copy_from_slice(self.parts.multipliers());
+            self.was_regular = true;
         } else {
             self.share(dx);
         }
@@ -187,9 +196,11 @@ impl<'a> AffineLaw<'a> {
     }
 
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
-    /// and the stability ([`RootWatch`]). Only for a few surfaces; the friction of many bodies is stable for good.
+    /// and the stability ([`RootWatch`]). Of many surfaces that act on one another they are not asked for: the friction of many
+    /// bodies is stable for good. Contacts that share their load from the start of the motion have no determinant; where the
+    /// multipliers were the only ones before, it vanishes.
     pub(super) fn ends(&mut self, watch: &mut RootWatch) -> [f64; 2] {
-        if self.parts.surfaces().len() > MOST_MEETING || self.is_shared() {
+        if self.is_shared() && !self.was_regular {
             return [1.0, 1.0];
         }
         let values = self.parts.normal().values();
@@ -213,10 +224,17 @@ impl<'a> AffineLaw<'a> {
             let unit = watch.unit(entries().fold(0.0, |size, v| v.abs().max(size)));
             return uncoupled_margins(entries().map(|v| v * unit));
         }
-        let mut jacobian = Matrix::zeros(m);
-        for i in 0..m {
-            normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
+        if m > MOST_MEETING {
+            let chosen = self
+                .in_small_groups
+                .get_or_insert_with(|| in_small_groups(normal));
+            if chosen.is_empty() {
+                return [1.0, 1.0];
+            }
+            let kappa: Vec<f64> = chosen.iter().map(|&i| self.kappa[i]).collect();
+            return watch.ends((&dense(&normal.principal(chosen)), true), &kappa);
         }
+        let jacobian = dense(normal);
         if m > 2 {
             return watch.ends((&jacobian, false), &self.kappa);
         }
@@ -286,6 +304,25 @@ impl<'a> AffineLaw<'a> {
         }
         Ok(())
     }
+}
+
+/// The surfaces in groups of a few that do not act on one another.
+fn in_small_groups(normal: &SparseRows) -> Vec<usize> {
+    let groups = coupled_blocks(normal).into_iter().map(|(places, _)| places);
+    let mut found: Vec<usize> = groups
+        .filter(|places| places.len() <= MOST_MEETING)
+        .flatten()
+        .collect();
+    found.sort_unstable();
+    found
+}
+
+fn dense(normal: &SparseRows) -> Matrix {
+    let mut matrix = Matrix::zeros(normal.n_rows());
+    for i in 0..normal.n_rows() {
+        normal.row(i).for_each(|(j, v)| matrix[(i, j)] = v);
+    }
+    matrix
 }
 
 /// Gives surfaces whose signs act on no rate the multipliers of those in whose place they are, one surface being there as Filippov has

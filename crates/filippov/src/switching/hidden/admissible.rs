@@ -4,12 +4,12 @@ use std::borrow::Cow;
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::cube::{stable_roots_within, zero_between, Bilinear, Lap, Matrix, NormalFields, Vector};
+use crate::cube::{stable_roots_within, zero_between, Bilinear, Lap, NormalFields, Vector};
 use crate::mode::Mode;
 use crate::patience::Patience;
 use crate::switching::incoming::with_multipliers;
 use crate::switching::resolution::Continuation;
-use crate::tolerances::{MOST_MEETING, PROPORTIONAL};
+use crate::tolerances::MOST_MEETING;
 
 /// A continuation that is possible without regard to the past.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +53,7 @@ pub(in crate::switching) fn attracting(
     if m <= 2 {
         return Some(attracting_together(fields, patience));
     }
-    let parts = independent_parts(fields);
+    let parts = fields.independent_parts();
     if parts.iter().any(|part| part.len() > MOST_MEETING) {
         return None;
     }
@@ -89,21 +89,6 @@ pub(in crate::switching) fn attracting(
         continuation: Continuation::mode(&mode),
     });
     Some((found.collect(), margin))
-}
-
-/// The surfaces in parts of which none acts on another one's rates.
-fn independent_parts(fields: &NormalFields) -> Vec<Vec<usize>> {
-    let mut acts = Matrix::zeros(fields.m());
-    let sizes: Vec<f64> = (0..fields.m()).map(|j| fields.row_size(j)).collect();
-    for p in 0..fields.m() {
-        for (j, value) in fields.columns(p).flat_map(|c| c.into_iter().enumerate()) {
-            // An entry that is rounding of its row does not act.
-            if value.abs() > PROPORTIONAL * sizes[j] {
-                (acts[(j, p)], acts[(p, j)]) = (1.0, 1.0);
-            }
-        }
-    }
-    acts.strong_parts()
 }
 
 fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admissible>, f64) {
