@@ -28,9 +28,9 @@ def energy(state: Any, radius: float, power: float) -> float:
 
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
 @pytest.mark.parametrize("radius", [0.0, 0.1, 1.0])
-@pytest.mark.parametrize("power", [1.5])
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0, 2.5, 3.0])
 def test_a_ball_that_falls_straight_down_feels_no_friction(power: float, radius: float, method: Any) -> None:
-    """At the first touch the load is zero, with no derivative of second order for Hertz's power 3/2."""
+    """At the first touch the load is zero to the rounding of the place. Hertz's 3/2 has no second derivative."""
     sol = ball(radius, power).solve((0, 1.2), [radius + 0.2, 0.0, 0.0], method=method, rtol=1e-9, atol=1e-11)
     assert sol.success
     assert np.all(np.abs(sol.y[2]) < 1e-12)
@@ -38,7 +38,7 @@ def test_a_ball_that_falls_straight_down_feels_no_friction(power: float, radius:
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.1, 1.0])
-@pytest.mark.parametrize("power", [1.5])
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0, 3.0])
 def test_a_ball_on_a_belt_slips_until_it_has_its_speed(power: float, radius: float) -> None:
     """The impulse of the first impact is 2 v: 0.3 of that is more than the speed of the belt."""
     sol = ball(radius, power, 1.0).solve((0, 1.2), [radius + 0.2, 0.0, 0.0], rtol=1e-9, atol=1e-11)

@@ -339,16 +339,7 @@ impl Candidate<'_> {
             two_fold = two_fold.located();
         }
         if !two_fold.is_regular()? && self.is_same_on_sides(at, notes, slid)? {
-            // Both fields agree, so every multiplier gives the same motion. We follow it for a moment, and take it if no other mode
-            // is viable.
-            let next = self.outset(&[]).viable.next;
-            let trial = try_mode(at, notes, &next, self.meeting.surfaces, ROUNDING)?;
-            return Ok(match trial {
-                Trial::Leaves(left) => {
-                    Verdict::Fades(self.guard(), Viable::strictly(Next { left, ..next }))
-                }
-                _ => Verdict::Fails(self.guard()),
-            });
+            return self.tried(at, notes);
         }
         let [minus, plus] = Guard::ends(slid);
         let motions = two_fold.motions()?.into_iter();
@@ -364,10 +355,27 @@ impl Candidate<'_> {
             (start.is_given, start.two_fold) = (true, Some(motion));
             Ok(outset)
         }))?;
-        // A trial knows no multiplier either.
         Ok(match verdict {
+            // A trial knows no multiplier either.
             Verdict::Open(_) => Verdict::Untold,
+            // The derivatives that decide may be rounding of the place.
+            Verdict::Fails(_) if self.is_same_on_sides(at, notes, slid)? => {
+                self.tried(at, notes)?
+            }
             verdict => verdict,
+        })
+    }
+
+    /// Sliding between fields that agree, so that every multiplier gives the same motion: we follow it for a moment, and take it
+    /// if no other mode is viable.
+    fn tried(&self, at: &Point, notes: &mut Notes) -> Result<Verdict, FieldError> {
+        let next = self.outset(&[]).viable.next;
+        let trial = try_mode(at, notes, &next, self.meeting.surfaces, ROUNDING)?;
+        Ok(match trial {
+            Trial::Leaves(left) => {
+                Verdict::Fades(self.guard(), Viable::strictly(Next { left, ..next }))
+            }
+            _ => Verdict::Fails(self.guard()),
         })
     }
 

@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::error::Undecided;
 use crate::mode::Mode;
 use crate::motion::MeetingFields;
-use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
+use crate::tolerances::{DOUBTFUL, FEW_SURFACES, MOST_MEETING, TANGENT};
 
 /// The fields around the surfaces of a meeting.
 pub(super) struct Surroundings {
@@ -38,10 +38,21 @@ impl Surroundings {
         };
         let mut gradient = vec![0.0; at.x.len()];
         let mut noise = Vec::with_capacity(surfaces.len());
+        // The regions around; of more surfaces than a few those on both sides of each.
+        let regions: Vec<Mode> = match surfaces.len() <= FEW_SURFACES {
+            true => regions_around(mode, surfaces),
+            false => Vec::new(),
+        };
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            for side in [-1, 1] {
-                let signs = mode.with(j, side).signs();
+            let sides = || [-1, 1].map(|side| mode.with(j, side)).to_vec();
+            let own = if regions.is_empty() {
+                sides()
+            } else {
+                regions.clone()
+            };
+            for region in own {
+                let signs = region.signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;
@@ -83,6 +94,18 @@ impl Surroundings {
         let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
         is_doubtful(&self.fields.restrict(&held), &noise)
     }
+}
+
+/// The modes with these surfaces on either side.
+fn regions_around(mode: &Mode, surfaces: &[usize]) -> Vec<Mode> {
+    let mut found = vec![mode.clone()];
+    for &j in surfaces {
+        let both = found
+            .iter()
+            .flat_map(|one| [-1, 1].map(|side| one.with(j, side)));
+        found = both.collect();
+    }
+    found
 }
 
 fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {

@@ -119,7 +119,7 @@ pub const SPIRAL_START: f64 = 100.0;
 pub const LONGEST_TURN: usize = 32;
 
 /// Surfaces of which all 3^m modes are tried where a motion may rest, as all lead back, and whose multipliers are bounded over a step by
-/// m 2^m bounds: for more, samples cost less.
+/// m 2^m bounds: for more, samples cost less. Where so many meet, the errors of the place are looked at in all regions around it.
 pub const FEW_SURFACES: usize = 3;
 
 /// How far beside such an intersection the modes are tried, in units of the tolerance: at its edge, and well inside.
