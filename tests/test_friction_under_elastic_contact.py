@@ -30,7 +30,7 @@ def energy(state: Any, radius: float, power: float) -> float:
 @pytest.mark.parametrize("radius", [0.0, 0.1, 1.0])
 @pytest.mark.parametrize("power", [1.0, 1.5, 2.0, 2.5, 3.0])
 def test_a_ball_that_falls_straight_down_feels_no_friction(power: float, radius: float, method: Any) -> None:
-    """At the first touch the load is zero to the rounding of the place. Hertz's 3/2 has no second derivative."""
+    """The load begins with zero, to the rounding of the place. Hertz's 3/2 has no second derivative there."""
     sol = ball(radius, power).solve((0, 1.2), [radius + 0.2, 0.0, 0.0], method=method, rtol=1e-9, atol=1e-11)
     assert sol.success
     assert np.all(np.abs(sol.y[2]) < 1e-12)
