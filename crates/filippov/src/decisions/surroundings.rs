@@ -38,20 +38,19 @@ impl Surroundings {
         };
         let mut gradient = vec![0.0; at.x.len()];
         let mut noise = Vec::with_capacity(surfaces.len());
-        // The regions around; of more surfaces than a few those on both sides of each.
-        let regions: Vec<Mode> = match surfaces.len() <= FEW_SURFACES {
-            true => regions_around(mode, surfaces),
-            false => Vec::new(),
-        };
+        // Of more surfaces than a few not all regions are looked at, but those on both sides of each.
+        let all = (surfaces.len() <= FEW_SURFACES).then(|| regions_around(mode, surfaces));
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            let sides = || [-1, 1].map(|side| mode.with(j, side)).to_vec();
-            let own = if regions.is_empty() {
-                sides()
-            } else {
-                regions.clone()
+            let both;
+            let regions = match &all {
+                Some(all) => all,
+                None => {
+                    both = regions_around(mode, &[j]);
+                    &both
+                }
             };
-            for region in own {
+            for region in regions {
                 let signs = region.signs();
                 let partials = at
                     .system
