@@ -277,3 +277,29 @@ def test_what_jumps_at_known_times_has_no_equilibria() -> None:
     assert not fl.equilibria(ball, [(-2, 2), (-2, 2)]).certified
     with pytest.raises(TypeError, match="it is a parameter of the system"):
         fl.equilibria(SYSTEM, BOX, alpha=0.4)
+
+
+@pytest.mark.parametrize(
+    ("right", "left", "stability"),
+    [
+        (lambda x: [x[1] - 0.1 * x[0], -x[0]], [-1.0, 0.5], "unstable"),
+        (lambda x: [x[1] - 0.1 * x[0], -x[0]], [1.0, 0.5], "stable"),
+        (lambda x: [-x[0], -2 * x[1]], [-1.0, 0.0], "unstable"),
+    ],
+)
+def test_an_equilibrium_on_the_boundary_of_its_region_is_one_of_the_surface(
+    right: Any, left: list[float], stability: str
+) -> None:
+    """The stable one of the region was listed too, by the sign of rounding, where runs go away."""
+
+    def fun(t: Any, x: Any) -> list[Any]:
+        return [np.where(x[0] > 0, a, b) for a, b in zip(right(x), left, strict=True)]
+
+    system = fl.System(fun, n=2)
+    (found,) = fl.equilibria(system, [(-2, 2), (-2, 2.1)])
+    assert (str(found.mode), found.stability) == ("0", stability)
+    np.testing.assert_allclose(found.y, [0.0, 0.0], atol=1e-12)
+    end = system.solve((0, 40), [-1e-6, -1e-6]).y[:, -1]
+    assert (np.max(np.abs(end)) > 1.0) == (stability == "unstable")
+    other = fl.equilibrium(system, [0.0, 0.0], mode="+")
+    assert (other.is_admissible, other.stability) == (False, "neutral")

@@ -110,12 +110,18 @@ class Equilibrium:
     def is_admissible(self) -> bool:
         """Whether the system is there: in its region, and with multipliers between -1 and 1; else virtual.
 
-        A kink belongs to the regions on both sides.
+        A kink belongs to the regions on both sides. Where the field jumps, an equilibrium of a region that
+        lies on its boundary, to rounding, is one of the surface, with a multiplier at its end.
         """
-        if np.any(np.abs(self.multipliers) > 1.0):
+        if np.any(np.abs(self.multipliers) > 1.0) or self._boundaries:
             return False
         outside = [j for j, h in zip(self._curve.surfaces_beside(), self.switching, strict=True) if not h > 0]
         return not outside or set(outside) <= set(self.kinks)
+
+    @cached_property
+    def _boundaries(self) -> tuple[int, ...]:
+        """Surfaces on which it lies, not as one of the sliding motion, and at which the field jumps."""
+        return tuple(j for j in self._curve.surfaces_at(self._w) if j not in self.kinks)
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
@@ -159,7 +165,8 @@ class Equilibrium:
 
         On a kink (`kinks`) the linear parts on its sides may differ. Then eigenvectors in their own regions
         decide, and with two states the growth over a turn. With more states it is ``"neutral"`` if these say
-        nothing.
+        nothing. On a surface at which the field jumps (a boundary equilibrium) motions come to the field
+        beyond: it is ``"unstable"`` if a real eigenvalue is positive, and else ``"neutral"``.
         """
         if self._most_beside > 0:
             return "unstable"
@@ -169,6 +176,10 @@ class Equilibrium:
     @cached_property
     def _along_its_surfaces(self) -> Stability:
         """The stability of its motion in its region or on its surfaces."""
+        if self._boundaries:
+            size = np.max(np.abs(self.eigenvalues), initial=0.0)
+            is_real = np.abs(self.eigenvalues.imag) <= _ROUNDING * size
+            return "unstable" if _largest_real_part(self.eigenvalues[is_real]) > 0 else "neutral"
         if self._cones is not None:
             return stability_in_cones(*self._cones)
         most = _largest_real_part(self.eigenvalues)
@@ -319,7 +330,7 @@ class EquilibriumCurve:
 
     def kinks(self, w: Array) -> tuple[int, ...]:
         """Return the surfaces not slid on that pass through a point and at which the field does not jump."""
-        near = self._surfaces_at(w)[:_MOST_KINKS]
+        near = self.surfaces_at(w)[:_MOST_KINKS]
         if not near:
             return ()
         scale = self.scales(w)[: self.n_unknowns]
@@ -342,7 +353,7 @@ class EquilibriumCurve:
         matrices = {ends: self._beyond(kinks, ends).linearisation(w) for ends in sides}
         return matrices, self._gradients(w)[list(kinks)] @ self.tangents(w)
 
-    def _surfaces_at(self, w: Array) -> list[int]:
+    def surfaces_at(self, w: Array) -> list[int]:
         """Return the surfaces not slid on that pass through a point."""
         beside = self.surfaces_beside()
         if not beside:
