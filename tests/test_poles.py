@@ -150,3 +150,24 @@ def test_the_places_listed_are_all_changes_of_sign() -> None:
             near = [zero - 1e-3, zero + 1e-3]
             assert np.sign(function(near[0])) != np.sign(function(near[1]))
     assert abs(brentq(POLES["power"][0], 1.9, 2.1) - 2.0) < 1e-12
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+def test_a_motion_is_not_carried_along_a_jump_of_what_it_slides_on(method: str) -> None:
+    """Where the sawtooth jumps at the pole, the state was moved with it, by 1 at once."""
+    spellings: list[Callable[[Any], Any]] = [
+        lambda t: 0.5 - np.arctan(1 / np.tan(np.pi * t)) / np.pi,
+        lambda t: 0.5 + np.arctan(np.tan(np.pi * (t - 0.5))) / np.pi,
+        lambda t: 0.5 + 0.5 * np.tanh(np.tan(np.pi * (t - 0.5))),
+    ]
+    for saw in spellings:
+
+        def fun(t: Any, x: Any, saw: Callable[[Any], Any] = saw) -> list[Any]:
+            return [np.where(x[0] < saw(t), 2.0, -2.0)]
+
+        sol = fl.solve_ivp(fun, (0.1, 5.3), [0.5], method=method)
+        assert not sol.success
+        assert sol.t[-1] == pytest.approx(1.0, abs=1e-6)
+        assert sol.y[0, -1] == pytest.approx(1.0, abs=1e-2)
+    whole = fl.solve_ivp(lambda t, x: [np.where(x[0] < t % 1, 2.0, -2.0)], (0.1, 5.3), [0.5], method=method)
+    assert whole.y[0, -1] == pytest.approx(0.4, abs=1e-9)

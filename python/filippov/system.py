@@ -131,7 +131,10 @@ class System(Points, Saving):
         refused = set(params).difference(accepted_names(fun, params))
         if refused:
             names = ", ".join(map(repr, sorted(refused)))
-            raise InputError(f"params: {function_name(fun, 'fun')}() has no parameter {names}")
+            raise InputError(
+                f"params: {function_name(fun, 'fun')}() has no parameter {names}; one that resets, events or "
+                "outputs read is in its signature too"
+            )
 
     @classmethod
     def from_fields(

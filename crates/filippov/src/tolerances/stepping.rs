@@ -27,7 +27,8 @@ pub const REACH: f64 = 1.25;
 /// changed by as much, and the approach is slower by the same factor again.
 pub const MOMENT: f64 = 1e-5;
 
-/// A moment in which the field changes by more than this part of its size is shortened, to a change of about [`MOMENT`].
+/// A moment in which the field changes by more than this part of its size is shortened, to a change of about [`MOMENT`]. A sliding
+/// motion that its surfaces move by more than this part of a step is carried along with a jump of theirs.
 pub const TOO_LARGE_A_CHANGE: f64 = 1e-2;
 
 /// How often a moment is shortened: each time by up to the factor [`MOMENT`].

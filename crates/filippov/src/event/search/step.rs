@@ -19,8 +19,8 @@ use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::system::is_zero_within;
 use crate::tolerances::{
-    CANCELLED, EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES, PROOF_DEPTH,
-    SPARE_SPREAD,
+    CANCELLED, EPS, ERRORS_OF_STEPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES,
+    PROOF_DEPTH, SPARE_SPREAD, TOO_LARGE_A_CHANGE,
 };
 use crate::vectors::largest;
 
@@ -144,6 +144,9 @@ impl StepSearch<'_, '_> {
             self.stepper.extend_cheaply(&self.run.x);
         }
         self.measure_margin(sought.dt)?;
+        if self.is_carried_along() {
+            return Ok(false);
+        }
         if self.run.motion.sliding.len() > 1 {
             self.prepare_bounds();
             self.watch_far_ends();
@@ -421,6 +424,27 @@ impl StepSearch<'_, '_> {
             Some(found.values)
         });
         self.run.motion.far_ends = ends;
+    }
+
+    /// Do the surfaces that the motion slides on jump within the step? The motion stays on them, and is then beside its extension by a
+    /// part of the step, and by more than errors.
+    fn is_carried_along(&mut self) -> bool {
+        let Detector {
+            margin, x: last, ..
+        } = &mut self.detector;
+        let run = &self.run;
+        if run.motion.is_straight || run.motion.sliding.is_empty() {
+            return false;
+        }
+        let end = self.stepper.end();
+        self.stepper.interpolant().at(1.0, last);
+        let (mut beside, mut moved) = (0.0_f64, 0.0_f64);
+        for (i, (margin, (x, end))) in margin.iter().zip(run.x.iter().zip(end)).enumerate() {
+            let unit = run.scale.of(i, *x, *end);
+            beside = beside.max((margin / MARGIN).max((last[i] - end).abs()) / unit);
+            moved = moved.max((end - x).abs() / unit);
+        }
+        beside > (TOO_LARGE_A_CHANGE * moved).max(ERRORS_OF_STEPS * ERRORS_OF_STEPS)
     }
 
     /// How far the motion lies beside the continuous extension, from the probes of the step.
