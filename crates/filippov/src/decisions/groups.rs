@@ -6,6 +6,7 @@ use super::surroundings::Surroundings;
 use crate::cube::newton;
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::page::IS_PAGE;
 use crate::tolerances::MOST_MEETING;
 
 /// The groups of the surfaces of a meeting; none if rules look at all of them together, or a group is too large.
@@ -25,7 +26,7 @@ impl<'m> Groups<'m> {
         notes: &mut Notes,
         meeting: &'m Meeting<'m>,
     ) -> Result<Option<Self>, FieldError> {
-        if meeting.surfaces.len() <= MOST_MEETING {
+        if IS_PAGE || meeting.surfaces.len() <= MOST_MEETING {
             return Ok(None);
         }
         let Ok(around) = meeting.surroundings(at, notes)? else {
@@ -63,30 +64,37 @@ impl<'m> Groups<'m> {
             }
         }
         notes.add_costs(&first);
-        let (mut start, mut lambda) = (Start::default(), vec![f64::NAN; self.around.fields.m()]);
-        for (k, group) in self.groups.iter().enumerate() {
+        // As a guess 0 does for a group that is affine.
+        let (mut start, mut lambda) = (Start::default(), vec![0.0; self.around.fields.m()]);
+        for group in &self.groups {
             let next = match self.settle_group(notes, &mode, group, settle)? {
                 Ok(next) => next,
                 Err(stop) => return Ok(Err(stop)),
             };
-            self.take_multipliers(&next, group, &mut lambda);
-            let own = next.start.map_or_else(Start::default, |start| *start);
-            start.oscillates |= own.oscillates;
-            start.is_given |= own.is_given;
-            start.is_located |= own.is_located;
-            start.is_rest = own.is_rest && (start.is_rest || k == 0);
-            start.leap = start.leap.or(own.leap);
-            start.moved = start.moved.or(own.moved);
+            let entries = next.mode.entries();
+            let slid = group
+                .iter()
+                .filter(|&&i| entries[self.meeting.surfaces[i]] == 0);
+            slid.zip(next.multipliers())
+                .for_each(|(&i, value)| lambda[i] = *value);
+            if let Some(own) = next.start {
+                start.oscillates |= own.oscillates;
+                start.is_given |= own.is_given;
+                start.is_located |= own.is_located;
+                start.leap = start.leap.or(own.leap);
+                start.moved = start.moved.or(own.moved);
+            }
             mode = next.mode;
         }
-        let slid = self.meeting.surfaces.iter().zip(&lambda);
-        let slid = slid.filter(|(&j, _)| mode.entries()[j] == 0);
-        let multipliers: Vec<f64> = slid.map(|(_, &value)| value).collect();
-        if multipliers.iter().all(|value| value.is_finite()) {
-            start.multipliers = multipliers;
-        } else {
-            start.is_given = false;
-        }
+        let entries = self.meeting.surfaces.iter().map(|&j| mode.entries()[j]);
+        let entries: Vec<i8> = entries.collect();
+        let slid = (0..entries.len()).filter(|&i| entries[i] == 0);
+        let guess: Vec<f64> = slid.map(|i| lambda[i]).collect();
+        let face = self.around.fields.restrict(&entries);
+        start.multipliers = match start.is_given {
+            true => guess,
+            false => newton(&face, &guess).unwrap_or_default(),
+        };
         if let Some(leap) = &mut start.leap {
             // The motion is said to be in the region of the leap from the start on.
             leap.region = mode.clone();
@@ -120,20 +128,5 @@ impl<'m> Groups<'m> {
             notes,
             &Meeting::new(&before, &own, &fresh, self.meeting.how),
         )
-    }
-
-    /// Writes the multipliers of the surfaces of a group that a motion slides on, as far as there are any.
-    fn take_multipliers(&self, next: &Next, group: &[usize], lambda: &mut [f64]) {
-        let entry = |i: usize| next.mode.entries()[self.meeting.surfaces[i]];
-        let slid: Vec<usize> = group.iter().copied().filter(|&i| entry(i) == 0).collect();
-        let mut held = vec![-1; self.around.fields.m()];
-        group.iter().for_each(|&i| held[i] = entry(i));
-        let found = match next.multipliers() {
-            known if known.len() == slid.len() => Some(known.to_vec()),
-            _ => newton(&self.around.fields.restrict(&held), &vec![0.0; slid.len()]),
-        };
-        for (&i, value) in slid.iter().zip(found.into_iter().flatten()) {
-            lambda[i] = value;
-        }
     }
 }

@@ -391,6 +391,13 @@ impl Notes {
         }
     }
 
+    /// Takes over what a trial warned of and chose: it is what follows.
+    pub fn take_findings(&mut self, trial: Notes) {
+        self.warnings.extend(trial.warnings);
+        (self.n_choices, self.candidates) = (trial.n_choices, trial.candidates);
+        (self.spirals, self.leaf) = (trial.spirals, trial.leaf);
+    }
+
     /// Adds what a trial cost.
     pub fn add_costs(&mut self, trial: &Notes) {
         self.n_field_evaluations += trial.n_field_evaluations;

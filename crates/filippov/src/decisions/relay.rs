@@ -12,7 +12,7 @@ use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
 use crate::motion::SmoothField;
-use crate::sparse::{coupled_blocks, SparseRows};
+use crate::sparse::SparseRows;
 use crate::status::Stop;
 use crate::system::{dot, AffineParts};
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
@@ -82,10 +82,7 @@ pub(super) fn decide_by_relay(
     let is_at_end = |i: usize| found.modes[i] == 0 && 1.0 - found.signs[i].abs() <= AT_SIDE;
     let starts_at_end = (0..surfaces.len()).any(|i| is_at_end(i) && !shares(&i));
     let is_open = !found.degenerate.is_empty() || is_few && starts_at_end;
-    let in_small_groups = || {
-        let groups = coupled_blocks(parts.normal());
-        groups.iter().all(|(group, _)| group.len() <= MOST_MEETING)
-    };
+    let in_small_groups = || parts.normal().in_small_blocks(MOST_MEETING).len() == surfaces.len();
     // What a few surfaces may do is listed, group by group where these do not act on one another.
     if !is_certain && (is_few || in_small_groups()) || !is_event && is_open {
         return Ok(None);

@@ -130,14 +130,13 @@ fn by_groups(
     groups: &Groups,
 ) -> Result<Option<Decided>, FieldError> {
     let settle_group = |notes: &mut Notes, own: &Meeting| Ok(settle(at, notes, own)?.decided);
-    let mut own = notes.clone();
+    let mut own = notes.of_trial();
     let mut decided = groups.settle(at, &mut own, &settle_group)?;
+    notes.add_costs(&own);
     if let Err(Stop::Intersection { .. }) = decided {
-        notes.n_field_evaluations = own.n_field_evaluations;
-        notes.n_surface_evaluations = own.n_surface_evaluations;
         return Ok(None);
     }
-    *notes = own;
+    notes.take_findings(own);
     if let Some(next) = decided.as_mut().ok().filter(|next| !next.leaps()) {
         let found = Found {
             multipliers: next.multipliers(),

@@ -38,20 +38,17 @@ impl Surroundings {
         };
         let mut gradient = vec![0.0; at.x.len()];
         let mut noise = Vec::with_capacity(surfaces.len());
-        // Of more surfaces than a few not all regions are looked at, but those on both sides of each.
-        let all = (surfaces.len() <= FEW_SURFACES).then(|| regions_around(mode, surfaces));
+        // All regions around; of more surfaces than a few those on both sides of each.
+        let m = surfaces.len();
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
-            let both;
-            let regions = match &all {
-                Some(all) => all,
-                None => {
-                    both = regions_around(mode, &[j]);
-                    &both
+            let own = [j];
+            let turned = if m <= FEW_SURFACES { surfaces } else { &own };
+            for pattern in 0..1_usize << turned.len() {
+                let mut signs = mode.signs();
+                for (bit, &k) in turned.iter().enumerate() {
+                    signs[k] = if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
                 }
-            };
-            for region in regions {
-                let signs = region.signs();
                 let partials = at
                     .system
                     .rate_gradient(j, &at.place(&signs), &mut gradient)?;
@@ -93,18 +90,6 @@ impl Surroundings {
         let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
         is_doubtful(&self.fields.restrict(&held), &noise)
     }
-}
-
-/// The modes with these surfaces on either side.
-fn regions_around(mode: &Mode, surfaces: &[usize]) -> Vec<Mode> {
-    let mut found = vec![mode.clone()];
-    for &j in surfaces {
-        let both = found
-            .iter()
-            .flat_map(|one| [-1, 1].map(|side| one.with(j, side)));
-        found = both.collect();
-    }
-    found
 }
 
 fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {

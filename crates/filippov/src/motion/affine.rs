@@ -4,7 +4,7 @@ use super::canopy::RootWatch;
 use super::ties::are_parallel;
 use crate::cube::{solve_relay, uncoupled_margins, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
-use crate::sparse::{coupled_blocks, SparseRows};
+use crate::sparse::SparseRows;
 use crate::system::{AffineParts, AffineSigns, OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{MOST_MEETING, ROUNDING};
 
@@ -227,7 +227,7 @@ impl<'a> AffineLaw<'a> {
         if m > MOST_MEETING {
             let chosen = self
                 .in_small_groups
-                .get_or_insert_with(|| in_small_groups(normal));
+                .get_or_insert_with(|| normal.in_small_blocks(MOST_MEETING));
             if chosen.is_empty() {
                 return [1.0, 1.0];
             }
@@ -304,17 +304,6 @@ impl<'a> AffineLaw<'a> {
         }
         Ok(())
     }
-}
-
-/// The surfaces in groups of a few that do not act on one another.
-fn in_small_groups(normal: &SparseRows) -> Vec<usize> {
-    let groups = coupled_blocks(normal).into_iter().map(|(places, _)| places);
-    let mut found: Vec<usize> = groups
-        .filter(|places| places.len() <= MOST_MEETING)
-        .flatten()
-        .collect();
-    found.sort_unstable();
-    found
 }
 
 fn dense(normal: &SparseRows) -> Matrix {

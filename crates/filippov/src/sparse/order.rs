@@ -69,6 +69,19 @@ pub fn coupled_blocks(matrix: &SparseRows) -> Vec<(Vec<usize>, SparseRows)> {
     parts.collect()
 }
 
+impl SparseRows {
+    /// The unknowns in blocks of at most `most` that are not coupled with one another, in increasing order.
+    pub(crate) fn in_small_blocks(&self, most: usize) -> Vec<usize> {
+        let blocks = components(self).into_iter().map(|block| block.unknowns);
+        let mut found: Vec<usize> = blocks
+            .filter(|block| block.len() <= most)
+            .flatten()
+            .collect();
+        found.sort_unstable();
+        found
+    }
+}
+
 /// For each unknown the others that it meets in a row or a column, those with few neighbours first.
 struct Neighbours {
     /// Where the list of each unknown starts in `lists`, and where it ends.
