@@ -1,4 +1,5 @@
-//! More surfaces than rules look at together, in groups that do not act on one another: each group by its own rules.
+//! Rules look at a few surfaces together. If more of them meet, in groups that do not act on one another, the rules decide each group
+//! alone.
 
 use super::point::{Decided, Lefts, Next, Notes, Point, Start};
 use super::rule::Meeting;
@@ -47,14 +48,14 @@ impl<'m> Groups<'m> {
         groups.any(|group| self.around.is_doubtful_at(group))
     }
 
-    /// What follows, one group after the other. A choice of one is known to the next.
+    /// Decides the groups one after the other. Each group knows what the groups before it have chosen.
     pub fn settle(
         &self,
         at: &Point,
         notes: &mut Notes,
         settle: SettleGroup<'_>,
     ) -> Result<Decided, FieldError> {
-        // The candidates of a group have the others where these go if no choice is asked for.
+        // The first round finds where each group goes by itself. The candidates of a group then name these modes of the others.
         let mut first = notes.of_trial();
         first.n_choices = at.policy.choices.len();
         let mut mode = self.meeting.mode.clone();
@@ -64,39 +65,34 @@ impl<'m> Groups<'m> {
             }
         }
         notes.add_costs(&first);
-        // As a guess 0 does for a group that is affine.
-        let (mut start, mut lambda) = (Start::default(), vec![0.0; self.around.fields.m()]);
+        let (mut start, mut lambda) = (Start::default(), vec![f64::NAN; self.around.fields.m()]);
+        let mut all_rest = true;
         for group in &self.groups {
             let next = match self.settle_group(notes, &mode, group, settle)? {
                 Ok(next) => next,
                 Err(stop) => return Ok(Err(stop)),
             };
-            let entries = next.mode.entries();
-            let slid = group
-                .iter()
-                .filter(|&&i| entries[self.meeting.surfaces[i]] == 0);
-            slid.zip(next.multipliers())
-                .for_each(|(&i, value)| lambda[i] = *value);
-            if let Some(own) = next.start {
-                start.oscillates |= own.oscillates;
-                start.is_given |= own.is_given;
-                start.is_located |= own.is_located;
-                start.leap = start.leap.or(own.leap);
-                start.moved = start.moved.or(own.moved);
-            }
+            self.take_multipliers(&next, group, &mut lambda);
+            let own = next.start.map_or_else(Start::default, |start| *start);
+            start.oscillates |= own.oscillates;
+            start.is_given |= own.is_given;
+            start.is_located |= own.is_located;
+            start.leap = start.leap.or(own.leap);
+            start.moved = start.moved.or(own.moved);
+            all_rest &= own.is_rest;
             mode = next.mode;
         }
-        let entries = self.meeting.surfaces.iter().map(|&j| mode.entries()[j]);
-        let entries: Vec<i8> = entries.collect();
-        let slid = (0..entries.len()).filter(|&i| entries[i] == 0);
-        let guess: Vec<f64> = slid.map(|i| lambda[i]).collect();
-        let face = self.around.fields.restrict(&entries);
-        start.multipliers = match start.is_given {
-            true => guess,
-            false => newton(&face, &guess).unwrap_or_default(),
-        };
+        start.is_rest = all_rest;
+        let slid = self.meeting.surfaces.iter().zip(&lambda);
+        let slid = slid.filter(|(&j, _)| mode.entries()[j] == 0);
+        let multipliers: Vec<f64> = slid.map(|(_, &value)| value).collect();
+        if multipliers.iter().all(|value| value.is_finite()) {
+            start.multipliers = multipliers;
+        } else {
+            start.is_given = false;
+        }
         if let Some(leap) = &mut start.leap {
-            // The motion is said to be in the region of the leap from the start on.
+            // The record says that the motion is in the region of the leap from the start on.
             leap.region = mode.clone();
         }
         Ok(Ok(Next {
@@ -106,7 +102,7 @@ impl<'m> Groups<'m> {
         }))
     }
 
-    /// What follows on a group, the other surfaces being where a mode says.
+    /// Decides a group. The entries of `mode` say where the other surfaces are.
     fn settle_group(
         &self,
         notes: &mut Notes,
@@ -128,5 +124,22 @@ impl<'m> Groups<'m> {
             notes,
             &Meeting::new(&before, &own, &fresh, self.meeting.how),
         )
+    }
+
+    /// Writes the multipliers of the surfaces of a group that the motion slides on. They stay NaN if Newton's method finds none.
+    fn take_multipliers(&self, next: &Next, group: &[usize], lambda: &mut [f64]) {
+        let entry = |i: usize| next.mode.entries()[self.meeting.surfaces[i]];
+        let slid: Vec<usize> = group.iter().copied().filter(|&i| entry(i) == 0).collect();
+        let found = match next.multipliers() {
+            known if known.len() == slid.len() => Some(known.to_vec()),
+            _ => {
+                let mut held = vec![-1; self.around.fields.m()];
+                group.iter().for_each(|&i| held[i] = entry(i));
+                newton(&self.around.fields.restrict(&held), &vec![0.0; slid.len()])
+            }
+        };
+        for (&i, value) in slid.iter().zip(found.into_iter().flatten()) {
+            lambda[i] = value;
+        }
     }
 }

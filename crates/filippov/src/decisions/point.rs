@@ -391,7 +391,7 @@ impl Notes {
         }
     }
 
-    /// Takes over what a trial warned of and chose: it is what follows.
+    /// Adds the warnings and the choices of a trial that the run follows.
     pub fn take_findings(&mut self, trial: Notes) {
         self.warnings.extend(trial.warnings);
         (self.n_choices, self.candidates) = (trial.n_choices, trial.candidates);

@@ -12,6 +12,7 @@ use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
 use crate::motion::SmoothField;
+use crate::page::IS_PAGE;
 use crate::sparse::SparseRows;
 use crate::status::Stop;
 use crate::system::{dot, AffineParts};
@@ -82,8 +83,9 @@ pub(super) fn decide_by_relay(
     let is_at_end = |i: usize| found.modes[i] == 0 && 1.0 - found.signs[i].abs() <= AT_SIDE;
     let starts_at_end = (0..surfaces.len()).any(|i| is_at_end(i) && !shares(&i));
     let is_open = !found.degenerate.is_empty() || is_few && starts_at_end;
-    let in_small_groups = || parts.normal().in_small_blocks(MOST_MEETING).len() == surfaces.len();
-    // What a few surfaces may do is listed, group by group where these do not act on one another.
+    let in_small_groups =
+        || !IS_PAGE && parts.normal().in_small_blocks(MOST_MEETING).len() == surfaces.len();
+    // Other rules list what a few surfaces may do, and what each small group of many may do.
     if !is_certain && (is_few || in_small_groups()) || !is_event && is_open {
         return Ok(None);
     }

@@ -28,7 +28,7 @@ pub(crate) enum Rule {
     SlidingLaw,
     /// The relay problem of a field that is affine in the signs.
     Relay,
-    /// Many surfaces in groups that do not act on one another: each group by its own rules.
+    /// Many surfaces meet in groups that do not act on one another. The rules decide each group alone.
     Groups,
     /// First-order data at an intersection: the attracting continuation, among several the limit of the hidden dynamics, and
     /// spirals. Germs decide where those do not.

@@ -122,7 +122,7 @@ fn region(_: &Point, _: &mut Notes, meeting: &Meeting) -> Result<Option<Decided>
     Ok(is_region.then(|| Ok(Next::new(meeting.mode.clone(), Lefts::new()))))
 }
 
-/// What follows on groups of surfaces that do not act on one another; `None`, and no note of it, if one of them does not tell.
+/// Decides each group of surfaces alone. If the rules do not decide some group, this returns `None` and leaves no warning.
 fn by_groups(
     at: &Point,
     notes: &mut Notes,

@@ -38,7 +38,7 @@ impl Surroundings {
         };
         let mut gradient = vec![0.0; at.x.len()];
         let mut noise = Vec::with_capacity(surfaces.len());
-        // All regions around; of more surfaces than a few those on both sides of each.
+        // We look at all regions around a few surfaces, and at both sides of each surface if there are more.
         let m = surfaces.len();
         for (i, &j) in surfaces.iter().enumerate() {
             let mut largest = DOUBTFUL * fields.row_size(i);
@@ -83,7 +83,7 @@ impl Surroundings {
         is_doubtful(&self.fields, &self.noise)
     }
 
-    /// The same of some surfaces that do not act on the others, nor these on them.
+    /// Answers the same question about a group of surfaces that is independent of the others.
     pub fn is_doubtful_at(&self, group: &[usize]) -> bool {
         let mut held = vec![-1; self.fields.m()];
         group.iter().for_each(|&i| held[i] = 0);

@@ -26,7 +26,7 @@ pub struct AffineLaw<'a> {
     sizes: Option<[f64; 2]>,
     /// The exit functions of the root that were computed last, and the values of N that they belong to.
     known_ends: Option<(Vec<f64>, [f64; 2])>,
-    /// Surfaces in groups that do not act on one another, but for those in large groups; not known before they are asked for.
+    /// The surfaces in small groups that do not act on one another. `ends` fills the list when it first needs it.
     in_small_groups: Option<Vec<usize>>,
     /// Were the multipliers the only ones at some evaluation since the motion began?
     was_regular: bool,
