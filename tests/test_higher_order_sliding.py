@@ -133,11 +133,48 @@ def test_terminal_sliding_rests_when_its_surface_has_led_to_the_target() -> None
     with pytest.warns(fl.FilippovWarning, match="rests from here"):
         sol = fl.solve_ivp(fun, (0, 10), [1.0, 0.5], rtol=1e-9, atol=1e-12)
     assert sol.success
-    reached, rests = sol.switches
+    reached, rests = (switch for switch in sol.switches if switch.kind == "enter_sliding")
     # On the surface x' = -x**0.6, which takes x**0.4 / 0.4.
     assert rests.t == pytest.approx(reached.t + reached.y_before[0] ** 0.4 / 0.4, abs=1e-4)
     assert sol.warnings[-1].code == "at_rest"
     assert np.abs(sol.y[:, -1]).max() < 1e-8
+
+
+# Spellings of one surface, from q on: x1 + |x0|^q with the sign of x0, or x0 + |x1|^(1/q) with that of x1.
+TERMINAL: dict[str, Callable[[float], Callable[[Any, Any], Any]]] = {
+    "power": lambda q: lambda x, v: v + np.abs(x) ** q * np.sign(x),
+    "inverse": lambda q: lambda x, v: x + np.abs(v) ** (1 / q) * np.sign(v),
+    "product": lambda q: lambda x, v: 2 * x + 2 * v * abs(v) ** (1 / q - 1),
+    "square root": lambda q: lambda x, v: v + np.sign(x) * np.sqrt(np.abs(x)),
+}
+
+
+@pytest.mark.parametrize("disturbance", [0.1, 0.3])
+@pytest.mark.parametrize(
+    ("spelling", "q"),
+    [(name, q) for name in list(TERMINAL)[:3] for q in (0.5, 0.54, 0.6, 2 / 3, 1 / 1.4, 0.8)]
+    + [("square root", 0.5)],
+)
+def test_terminal_sliding_holds_a_disturbance_at_its_target(
+    spelling: str, q: float, disturbance: float
+) -> None:
+    """The run stopped on arrival: rounding of the state made a slope of the surface where it has none."""
+    surface = TERMINAL[spelling](q)
+
+    def fun(t: Any, x: Any) -> list[Any]:
+        return [x[1], -2.5 * np.sign(surface(x[0], x[1])) + disturbance * np.sin(t)]
+
+    sol = fl.solve_ivp(fun, (0.0, 8.0), [1.0, 0.0], rtol=1e-9, atol=1e-12)
+    assert sol.success, sol.message
+    # On the surface x' = -x^q, whatever the disturbance is.
+    begin = next(s.t for s in sol.switches if s.kind == "enter_sliding")
+    left = sol.sol(begin)[0] ** (1 - q)
+    t = np.linspace(begin, 8.0, 101)
+    x = np.maximum(left - (1 - q) * (t - begin), 0.0) ** (1 / (1 - q))
+    assert left / (1 - q) < 7.0
+    np.testing.assert_allclose(sol.sol(t)[0], x, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(sol.sol(t)[1], -(x**q), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(sol.y[:, -1], 0.0, rtol=0, atol=1e-12)
 
 
 def test_finite_time_controller_with_fractional_powers_rests() -> None:

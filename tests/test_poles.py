@@ -9,6 +9,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 METHODS = ("Taylor", "DOPRI5", "DOP853", "Rodas5P")
@@ -155,19 +156,113 @@ def test_the_places_listed_are_all_changes_of_sign() -> None:
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
 def test_a_motion_is_not_carried_along_a_jump_of_what_it_slides_on(method: str) -> None:
     """Where the sawtooth jumps at the pole, the state was moved with it, by 1 at once."""
-    spellings: list[Callable[[Any], Any]] = [
+
+    def follows(saw: Callable[[Any], Any]) -> fl.Solution:
+        return fl.solve_ivp(
+            lambda t, x: [np.where(x[0] < saw(t), 2.0, -2.0)], (0.1, 5.3), [0.5], method=method
+        )
+
+    for saw in (
+        lambda t: t % 1,
         lambda t: 0.5 - np.arctan(1 / np.tan(np.pi * t)) / np.pi,
         lambda t: 0.5 + np.arctan(np.tan(np.pi * (t - 0.5))) / np.pi,
-        lambda t: 0.5 + 0.5 * np.tanh(np.tan(np.pi * (t - 0.5))),
-    ]
-    for saw in spellings:
+    ):
+        sol = follows(saw)
+        assert sol.success, sol.message
+        assert sol.y[0, -1] == pytest.approx(0.4, abs=1e-9)
+    # Up to here and no further: tanh of a pole jumps too, and has no formula that is smooth at the jump.
+    sol = follows(lambda t: 0.5 + 0.5 * np.tanh(np.tan(np.pi * (t - 0.5))))
+    assert not sol.success
+    assert sol.t[-1] == pytest.approx(1.0, abs=1e-6)
+    assert sol.y[0, -1] == pytest.approx(1.0, abs=1e-2)
 
-        def fun(t: Any, x: Any, saw: Callable[[Any], Any] = saw) -> list[Any]:
-            return [np.where(x[0] < saw(t), 2.0, -2.0)]
 
-        sol = fl.solve_ivp(fun, (0.1, 5.3), [0.5], method=method)
-        assert not sol.success
-        assert sol.t[-1] == pytest.approx(1.0, abs=1e-6)
-        assert sol.y[0, -1] == pytest.approx(1.0, abs=1e-2)
-    whole = fl.solve_ivp(lambda t, x: [np.where(x[0] < t % 1, 2.0, -2.0)], (0.1, 5.3), [0.5], method=method)
-    assert whole.y[0, -1] == pytest.approx(0.4, abs=1e-9)
+def angle_of_line(x: Any) -> Any:
+    """Return the angle of a line through the origin, between -pi/2 and pi/2."""
+    return np.arctan(x[1] / x[0])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_arctangent_of_a_quotient_jumps_at_its_poles(method: str) -> None:
+    """In a field the jump was met by short steps, 1e-7 off; what was compared with it ended the run."""
+    tight: dict[str, Any] = {"method": method, "rtol": 1e-10, "atol": 1e-12}
+    end = 6.0
+    # From the angle 0.1 on it grows with t, less a half turn at pi/2 and at 3 pi/2.
+    integral = 0.1 * end + end**2 / 2 - PI * ((end + 0.1 - PI / 2) + (end + 0.1 - 3 * PI / 2))
+    sol = fl.solve_ivp(lambda t, x: [-x[1], x[0], angle_of_line(x)], (0.0, end), [*turned(0.1), 0.0], **tight)
+    assert sol.success, sol.message
+    assert not sol.warnings
+    assert abs(sol.y[2, -1] - integral) < 1e-8
+    assert np.allclose([s.t for s in sol.switches], [PI / 2 - 0.1, 3 * PI / 2 - 0.1], rtol=0, atol=1e-9)
+
+    # A state of rate 0.4 follows the angle: up to its jump, then down to it, and up with it again.
+    def fun(t: float, x: Any) -> Any:
+        return [-x[1], x[0], np.where(x[2] < angle_of_line(x), 0.4, -0.4)]
+
+    sol = fl.solve_ivp(fun, (0.0, end), [*turned(0.1), 0.0], **tight)
+    assert sol.success, sol.message
+    up = 0.4 * (PI / 2 - 0.1)
+    # They meet this long after the first jump, where up - 0.4 s = -pi/2 + s; the second one is pi after it.
+    meet = (up + PI / 2) / 1.4
+    since_second = end - (3 * PI / 2 - 0.1)
+    assert abs(sol.y[2, -1] - (up - 0.4 * meet + 0.4 * (PI - meet) - 0.4 * since_second)) < 1e-8
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5"])
+def test_a_motion_slides_on_a_pole_inside_of_an_arctangent(method: str) -> None:
+    """It chattered, in 1e7 steps: x' = 0.2 - arctan(1/x) is 0.2 - pi/2 above x = 0, and 0.2 + pi/2 below."""
+    sol = fl.solve_ivp(lambda t, x: [0.2 - np.arctan(1 / x[0])], (0.0, 5.0), [1.0], method=method)
+    assert sol.success, sol.message
+    assert [switch.kind for switch in sol.switches] == ["enter_sliding"]
+    assert sol.switches[0].t == pytest.approx(quad(lambda x: 1 / (np.arctan(1 / x) - 0.2), 0, 1)[0], rel=1e-4)
+    assert abs(sol.y[0, -1]) < 1e-12
+
+
+def test_an_arctangent_without_a_pole_has_no_surface() -> None:
+    for text in ("x[1] / 2.0", "x[1] / (1 + x[0]**2)", "1 / x[0]**2", "x[1] * x[0]"):
+        names: dict[str, Any] = {"np": np}
+        exec(f"def fun(t, x): return [1.0, np.arctan({text})]", names)
+        sol = fl.solve_ivp(names["fun"], (0.0, 2.0), [-1.0, 0.5])
+        assert sol.success
+        assert sol.surfaces == ()
+
+
+def triangle(u: Any) -> Any:
+    """Return the distance of u from the nearest multiple of 2 pi."""
+    return np.abs((u + PI) % (2 * PI) - PI)
+
+
+# Arcs of waves, and what they are.
+ARCS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "arccos of cos": (lambda u: np.arccos(np.cos(u)), triangle),
+    "arccos of -cos": (lambda u: np.arccos(-np.cos(u)), lambda u: PI - triangle(u)),
+    "arcsin of cos": (lambda u: np.arcsin(np.cos(u)), lambda u: PI / 2 - triangle(u)),
+    "arcsin of sin": (lambda u: np.arcsin(np.sin(u)), lambda u: PI / 2 - triangle(u - PI / 2)),
+    "arccos of sin": (lambda u: np.arccos(np.sin(u)), lambda u: triangle(u - PI / 2)),
+    "arctan of tan": (lambda u: np.arctan(np.tan(u)), lambda u: (u + PI / 2) % PI - PI / 2),
+}
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
+@pytest.mark.parametrize("name", ARCS)
+def test_triangles_and_sawtooths_written_by_arcs(name: str, method: str) -> None:
+    """In a field, in a comparison that is crossed, and as what a motion slides along: kinks ended the run."""
+
+    def model(wave: Callable[[Any], Any]) -> Callable[[Any, Any], list[Any]]:
+        return lambda t, x: [
+            wave(t),
+            wave(2 * x[1]) / 4 + 1,
+            np.where(wave(t) > 0.3 * np.sin(t), 1.0, -1.0),
+            np.where(x[3] < wave(t), 2.0, -2.0),
+        ]
+
+    arc, same = ARCS[name]
+    u = np.linspace(-9.0, 9.0, 2003)
+    assert np.allclose(arc(u), same(u), rtol=0, atol=1e-7)
+    found, expected = (
+        fl.solve_ivp(model(wave), (-2.0, 9.1), [0.0, 0.2, 0.0, 0.5], method=method, rtol=1e-10, atol=1e-12)
+        for wave in (arc, same)
+    )
+    assert found.success, found.message
+    assert not found.warnings
+    np.testing.assert_allclose(found.y[:, -1], expected.y[:, -1], rtol=0, atol=1e-8)

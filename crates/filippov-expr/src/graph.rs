@@ -199,7 +199,7 @@ impl Graph {
     }
 
     /// Whether the node is `s_j * v` with the known sign s_j of v itself: |v|.
-    fn is_absolute_value(&self, node: &Node) -> bool {
+    pub(crate) fn is_absolute_value(&self, node: &Node) -> bool {
         let Node::Binary(BinaryOp::Mul, left, right) = *node else {
             return false;
         };

@@ -6,7 +6,7 @@
 //! | term | beside c | compared instead |
 //! |---|---|---|
 //! | `cbrt(u)` | anything | u and c^3 |
-//! | `sqrt(u)` | a number, what no motion changes, or of known sign; anything, if u is a cube root | u and c \|c\| |
+//! | `sqrt(u)` | a number, what no motion changes, or of known sign; anything, if u is a cube root, or \|v\| with the sign of v in front | u and c \|c\| |
 //! | `u**p` | the same | u and the power 1/p of \|c\|, with the sign of c |
 //! | `log(u)` | the same | u and exp(c) |
 //!
@@ -40,7 +40,52 @@ struct Term {
 
 /// An expression with the same sign as a sum, times `+-1`, in which one root less stands; `None` if no root can be taken away.
 pub(crate) fn without_root(graph: &mut Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
-    solved_for_a_root(graph, form, true)
+    let joined = with_own_roots_joined(graph, form).map(|joined| (joined, 1.0));
+    joined.or_else(|| solved_for_a_root(graph, form, true))
+}
+
+/// A sum in which `v |v|^p` is written as the sign of v times `|v|^(p + 1)`, which has a slope at v = 0; `None` without such terms.
+fn with_own_roots_joined(graph: &mut Graph, form: &LinearForm) -> Option<NodeId> {
+    let mut terms = form.terms.clone();
+    for term in &mut terms {
+        let Node::Binary(BinaryOp::Mul, a, b) = *graph.node(term.0) else {
+            continue;
+        };
+        let joined = joined_with_own_root(graph, a, b);
+        term.0 = joined
+            .or_else(|| joined_with_own_root(graph, b, a))
+            .unwrap_or(term.0);
+    }
+    let has_changed = terms != form.terms;
+    let constant = form.constant;
+    has_changed.then(|| LinearForm { terms, constant }.expression(graph))
+}
+
+/// `v |v|^p` as one power, if the second factor is that root.
+fn joined_with_own_root(graph: &mut Graph, v: NodeId, root: NodeId) -> Option<NodeId> {
+    let (base, exponent) = match *graph.node(root) {
+        Node::Unary(UnaryOp::Sqrt, base) => (base, 0.5),
+        Node::Binary(BinaryOp::Pow, base, p) => (base, graph.as_constant(p)?),
+        _ => return None,
+    };
+    let (v, factor) = LinearForm::of(graph, v).single_atom()?;
+    let size = match *graph.node(base) {
+        Node::Unary(UnaryOp::NotNegative, size) => size,
+        _ => base,
+    };
+    let is_size = match *graph.node(size) {
+        Node::Binary(BinaryOp::Mul, _, inner) => {
+            graph.is_absolute_value(graph.node(size)) && (inner == v || inner == graph.neg(v))
+        }
+        _ => false,
+    };
+    if exponent < 0.0 || !is_size {
+        return None;
+    }
+    let exponent = graph.constant(exponent + 1.0);
+    let (sign, power) = (graph.sign(v), graph.pow(base, exponent));
+    let (odd, factor) = (graph.mul(sign, power), graph.constant(factor));
+    Some(graph.mul(factor, odd))
 }
 
 /// The same, with the sign of the sum where that is defined: beyond the domain of the root it may have another one.
@@ -160,7 +205,8 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
                 let below = graph.all_below(&[term.argument]);
                 let is_cube =
                     |id: &NodeId| matches!(graph.node(*id), Node::Unary(UnaryOp::Cbrt, _));
-                let is_steep = below.iter().any(is_cube);
+                // The root of |v| with the sign of v is as steep at its zero, and v itself is left beside the power.
+                let is_steep = below.iter().any(is_cube) || is_odd_root(graph, term);
                 odd_power(graph, &rest, sum, p, is_steep)?
             }
         },
@@ -180,6 +226,14 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
         None => term.argument,
     };
     Some((graph.add(argument, inverse), coefficient.signum()))
+}
+
+/// Is this the root of |v| with the sign of v?
+fn is_odd_root(graph: &Graph, term: &Term) -> bool {
+    match (term.sign, *graph.node(term.argument)) {
+        (Some(sign), Node::Binary(BinaryOp::Mul, own, v)) => own == sign && !graph.has_signs(v),
+        _ => false,
+    }
 }
 
 /// The odd power p of `k s v^q`, which is one root with signs s: `|k|^p s v^(pq)` with the sign of k.
@@ -254,10 +308,16 @@ fn odd_power(
             let zero = graph.constant(0.0);
             graph.binary(BinaryOp::Hypot, c, zero)
         }
-        false => graph.abs(c),
+        false if p.fract() == 0.0 => graph.abs(c),
+        // A broken power has no value where the sign of c is not yet that of c.
+        false => {
+            let magnitude = graph.abs(c);
+            graph.unary(UnaryOp::NotNegative, magnitude)
+        }
     };
     let power = power(graph, magnitude, p - 1.0);
-    Some(graph.mul(c, power))
+    let odd = graph.mul(c, power);
+    Some(joined_with_own_root(graph, c, power).unwrap_or(odd))
 }
 
 #[cfg(test)]

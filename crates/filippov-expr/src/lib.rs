@@ -39,7 +39,8 @@
 
 #![warn(unnameable_types)]
 
-pub mod blend;
+pub mod arcs;
+mod blend;
 mod constant_of_motion;
 pub mod container;
 pub mod derivative;
@@ -75,6 +76,7 @@ mod surface_order;
 pub mod switching;
 mod tape;
 
+pub use arcs::legs_of_arc;
 pub use blend::SignDependence;
 pub use constant_of_motion::RateTerms;
 pub use derivative::{Gradient, Wrt};

@@ -1,7 +1,5 @@
 //! Poles of switching functions: N/D changes its sign where D vanishes, too. So does N D, which is smooth there.
 
-use std::f64::consts::FRAC_PI_2;
-
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
@@ -31,6 +29,17 @@ pub(crate) fn without_poles(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
     if let Some(inner) = inside_of_monotone(graph, id) {
         return without_poles(graph, inner);
     }
+    let (numerator, denominator) = as_quotient(graph, id)?;
+    let form = LinearForm::of(graph, denominator);
+    Some(match graph.known_sign(&form) {
+        Some(Switching::Constant(1.0)) => numerator,
+        Some(Switching::Constant(-1.0)) => graph.neg(numerator),
+        _ => graph.mul(numerator, denominator),
+    })
+}
+
+/// An expression that has poles as numerator and denominator; `None` if it has none, or too many.
+pub(crate) fn as_quotient(graph: &mut Graph, id: NodeId) -> Option<(NodeId, NodeId)> {
     let nodes = graph.reachable_by([id], |id| terms_and_factors(graph, id));
     let n_poles = nodes.iter().filter(|&&id| has_pole(graph, id)).count();
     if n_poles == 0 || n_poles > MOST_DENOMINATORS {
@@ -44,21 +53,11 @@ pub(crate) fn without_poles(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
         let fraction = fractions.of(node);
         fractions.known.insert(node, fraction);
     }
-    let Fraction {
-        numerator,
-        denominator,
-    } = fractions.known[&id];
-    let denominator = denominator?;
-    let form = LinearForm::of(graph, denominator);
-    Some(match graph.known_sign(&form) {
-        Some(Switching::Constant(1.0)) => numerator,
-        Some(Switching::Constant(-1.0)) => graph.neg(numerator),
-        _ => graph.mul(numerator, denominator),
-    })
+    let fraction = fractions.known[&id];
+    Some((fraction.numerator, fraction.denominator?))
 }
 
-/// `atan(u) - c` has the sign of `u - tan(c)`, which is a quotient where u is one; likewise for other increasing functions that
-/// are bounded where u is infinite.
+/// `exp(u) - c` has the sign of `u - log(c)`, which is a quotient where u is one; likewise `tanh(u) - c`.
 fn inside_of_monotone(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
     let form = LinearForm::of(graph, id);
     let (atom, coefficient) = form
@@ -71,7 +70,6 @@ fn inside_of_monotone(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
     };
     let level = -form.constant / coefficient;
     let level = match function {
-        UnaryOp::Atan if level.abs() < FRAC_PI_2 => level.tan(),
         UnaryOp::Tanh if level.abs() < 1.0 => level.atanh(),
         UnaryOp::Exp if level > 0.0 => level.ln(),
         _ => return None,

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use filippov_expr::{
-    roots, BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp,
+    legs_of_arc, roots, BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -81,6 +81,14 @@ impl Builder {
         Ok(roots::apply_to_two(&mut graph, op, a, b).0)
     }
 
+    /// The legs of which an arc is the angle: see `legs_of_arc`.
+    fn legs_of_arc(&self, op: &str, a: u32) -> PyResult<Option<(u32, u32)>> {
+        let op = UnaryOp::from_name(op).ok_or_else(|| unknown(op))?;
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(legs_of_arc(&mut graph, op, a).map(|(y, x)| (y.0, x.0)))
+    }
+
     /// An expression without the terms that cancel in it: see `Graph::without_cancelled`.
     fn without_cancelled(&self, a: u32) -> PyResult<u32> {
         let mut graph = self.graph();
@@ -125,11 +133,11 @@ impl Builder {
         Ok(())
     }
 
-    /// Whether an expression may bend, jump or end: where a sign inside of it changes, or a root begins.
+    /// Whether an expression may bend, jump or end: see `Graph::has_kinks`.
     fn has_kinks(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         let a = Self::node(&graph, a)?;
-        Ok(graph.has_signs(a) || !graph.is_analytic(&[a]))
+        Ok(graph.has_kinks(a))
     }
 
     /// The ends of an interval that an expression does not leave.

@@ -625,6 +625,9 @@ impl Reader<'_> {
                 return self.operation(call, Operator::Add, &half, &scaled);
             }
             _ => match unary_operation(name) {
+                Some(op @ (UnaryOp::Asin | UnaryOp::Acos | UnaryOp::Atan)) => {
+                    self.tracer.arc(op, node)?
+                }
                 Some(op) => self.tracer.function(op, node),
                 None => return self.unknown(call, function, 1),
             },

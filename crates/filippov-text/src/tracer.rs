@@ -4,10 +4,12 @@
 //! this file is `branching.py`, the others are `laws.rs`, `tables.rs` and `questions.rs`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 use std::rc::Rc;
 
 use filippov_expr::{
-    roots, BinaryOp, Graph, Names, NodeId, PartSign, Pieces, Regions, Switching, UnaryOp,
+    legs_of_arc, roots, BinaryOp, Graph, Names, NodeId, PartSign, Pieces, Regions, Switching,
+    UnaryOp,
 };
 use ruff_text_size::{Ranged, TextRange};
 
@@ -621,6 +623,26 @@ impl Tracer {
             Some(known) => known.1 = continued,
             None => self.continued.push((root, continued)),
         }
+    }
+
+    /// An arc: of a quotient or a sine a choice of angles that do not jump or bend.
+    pub fn arc(&mut self, op: UnaryOp, argument: NodeId) -> Result<NodeId, Refused> {
+        let Some((y, x)) = legs_of_arc(&mut self.graph, op, argument) else {
+            return Ok(self.unary(op, argument));
+        };
+        let opposite = match op {
+            UnaryOp::Atan => self.unary(UnaryOp::Neg, y),
+            _ => y,
+        };
+        let away = self.unary(UnaryOp::Neg, x);
+        let behind = self.binary(BinaryOp::Atan2, opposite, away);
+        let ahead = self.binary(BinaryOp::Atan2, y, x);
+        let angle = self.choose_by(x, ahead, behind)?;
+        if op != UnaryOp::Acos {
+            return Ok(angle);
+        }
+        let right = self.graph.constant(0.5 * PI);
+        Ok(self.binary(BinaryOp::Sub, right, angle))
     }
 
     /// A cube root as sign and size, the size continued in switching functions as a root.

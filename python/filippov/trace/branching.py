@@ -481,6 +481,20 @@ class Tracer:
         self._roots[root] = (argument, None)
         return root
 
+    def arc(self, op: str, argument: int) -> int:
+        """Return the node of an arc: of a quotient or a sine a choice of angles that do not jump or bend."""
+        builder = self.builder
+        legs = builder.legs_of_arc(op, argument)
+        if legs is None:
+            return builder.unary(op, argument)
+        y, x = legs
+        opposite = builder.unary("negative", y) if op == "arctan" else y
+        behind = builder.binary("arctan2", opposite, builder.unary("negative", x))
+        angle = self.choose(x, builder.binary("arctan2", y, x), behind)
+        if op != "arccos":
+            return angle
+        return builder.binary("subtract", builder.constant(0.5 * math.pi), angle)
+
     def with_ends_of_roots(self, field: list[int], root_ends: str) -> list[int]:
         """Return a field whose cube roots switch with the sign of their argument: at zero they have no slope.
 

@@ -72,6 +72,8 @@ class Scalar:
             return Scalar(tracer, tracer.root(self.node, lambda argument: tracer.builder.unary(op, argument)))
         if op == "cbrt":
             return Scalar(tracer, tracer.cube_root(self.node))
+        if op in ("arcsin", "arccos", "arctan"):
+            return Scalar(tracer, tracer.arc(op, self.node))
         return Scalar(tracer, tracer.builder.unary(op, self.node))
 
     def binary(self, op: str, other: Any) -> Any:

@@ -49,6 +49,26 @@ fn a_cube_root_beside_anything_switches_as_a_cube() {
 }
 
 #[test]
+fn odd_roots_beside_anything_switch_as_odd_powers() {
+    let mut g = Graph::new();
+    let (x, y) = (g.state(0), g.state(1));
+    let (sign, size) = (g.sign(x), g.abs(x));
+    let sqrt = root(&mut g, UnaryOp::Sqrt, size);
+    let odd = g.mul(sign, sqrt);
+    let sum = g.add(y, odd);
+    assert_eq!(surface(&mut g, sum).0, "x[0] + sign(x[1])*x[1]**2");
+    // A function times its own root is one power; times another root it is left.
+    let (two, beside) = (g.constant(-2.0), g.abs(y));
+    let (own, other) = (root(&mut g, UnaryOp::Sqrt, beside), g.mul(y, sqrt));
+    let twice = g.mul(two, y);
+    let product = g.mul(twice, own);
+    let sum = g.sub(x, product);
+    assert_eq!(surface(&mut g, sum).0, "x[0] + 2*sign(x[1])*abs(x[1])**1.5");
+    let sum = g.add(x, other);
+    assert_eq!(surface(&mut g, sum).0, "x[0] + x[1]*sqrt(abs(x[0]))");
+}
+
+#[test]
 fn two_roots_switch_where_their_arguments_are_equal() {
     let mut g = Graph::new();
     let (x, y) = (g.state(0), g.state(1));

@@ -11,9 +11,9 @@ const MOST_FACTORS: u32 = 4;
 
 impl Graph {
     /// Do the values have a Taylor series wherever they are finite? Roots, powers, logarithms and some inverse
-    /// functions do not: they end, or bend sharply, at a finite value.
+    /// functions do not: they end, or bend sharply, at a finite value. An angle has none at the origin, where it has no value.
     pub fn is_analytic(&self, nodes: &[NodeId]) -> bool {
-        use BinaryOp::{Atan2, Hypot, Pow};
+        use BinaryOp::{Hypot, Pow};
         use UnaryOp::{Acos, Acosh, Asin, Atanh, Cbrt, Log, Log10, Log1p, Log2, Sqrt};
         let all = self.all_below(nodes);
         !all.into_iter().any(|id| match *self.node(id) {
@@ -25,11 +25,19 @@ impl Graph {
                 is_edged && self.facts(a).varies
             }
             Node::Binary(op, a, b) => {
-                let is_edged = matches!(op, Pow | Atan2 | Hypot);
+                let is_edged = matches!(op, Pow | Hypot);
                 is_edged && (self.facts(a).varies || self.facts(b).varies)
             }
             _ => false,
         })
+    }
+
+    /// May a value bend, jump or end: where a sign inside of it changes, a root begins, or an angle has its cut?
+    pub fn has_kinks(&self, node: NodeId) -> bool {
+        let is_angle = |id: &NodeId| matches!(self.node(*id), Node::Binary(BinaryOp::Atan2, ..));
+        self.has_signs(node)
+            || !self.is_analytic(&[node])
+            || self.all_below(&[node]).iter().any(is_angle)
     }
 
     /// May the values change where no Taylor coefficient tells? Exponential functions, and what is made of them, come up

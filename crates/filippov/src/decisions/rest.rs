@@ -33,6 +33,14 @@ pub(super) fn stay_if_nothing_leaves(
             }
         }
     }
+    // Beside the surfaces rounding of the place makes slopes, as of |v|^0.4.
+    let (mut x, signs) = (at.x.to_vec(), meeting.mode.signs());
+    let (mut projector, setting) = (at.projector(), at.setting(&signs));
+    projector.project_onto(at.system, meeting.surfaces, at.t, &mut x, setting)?;
+    let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
+    let is_near = at.scale.largest(&shift, at.x) <= 1.0;
+    let at = &at.moved(at.t, if is_near { &x } else { at.x });
+    let meeting = &meeting.with_surfaces(meeting.surfaces);
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
         let velocity = at.velocity(notes, &stays.mode, &[])?;
         let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;

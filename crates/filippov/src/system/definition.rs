@@ -335,11 +335,11 @@ fn check_sign(name: &'static str, value: f64) -> Result<(), Error> {
 /// The laws that are followed only where something reads them: those of quantities that may end or jump, and what is made of
 /// them. None if there are none of the first kind.
 fn followers(graph: &Graph, laws: &[Law], n_parameters: usize) -> Vec<Follower> {
-    let may_end = |node: NodeId| graph.has_signs(node) || !graph.is_analytic(&[node]);
     let follower = |(index, law): (usize, &Law)| {
         let guard = law.guard().filter(|_| !law.has_memory());
         let argument = law.nodes()[0];
-        let is_one = matches!(law, Law::Held { .. }) || guard.is_some() && may_end(argument);
+        let is_one =
+            matches!(law, Law::Held { .. }) || guard.is_some() && graph.has_kinks(argument);
         is_one.then_some(Follower {
             parameter: (n_parameters + index) as u32,
             guard,
