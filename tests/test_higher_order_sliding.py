@@ -177,6 +177,30 @@ def test_terminal_sliding_holds_a_disturbance_at_its_target(
     np.testing.assert_allclose(sol.y[:, -1], 0.0, rtol=0, atol=1e-12)
 
 
+# The velocity begins there with a vertical tangent, of which the steps warn as of a jump.
+@pytest.mark.filterwarnings("ignore:undeclared_jump")
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
+@pytest.mark.parametrize("power", [0.4, 0.45, 0.55, 2 / 3, 0.7, 0.9])
+def test_a_motion_slides_across_the_kink_of_an_odd_power(power: float, method: str) -> None:
+    """The run stopped there: the slope of the rate, as steep as one likes, made noise of all components."""
+    tight: dict[str, Any] = {"method": method, "rtol": 1e-9, "atol": 1e-12}
+
+    def by_time(t: Any, x: Any) -> list[Any]:
+        return [-3 * np.sign(t - 1 + np.abs(x[0]) ** power * np.sign(x[0]))]
+
+    def by_state(t: Any, x: Any) -> list[Any]:
+        return [-3 * np.sign(x[0] + 1.2 * x[1] * abs(1.2 * x[1]) ** (1 / power - 1)), 1.0]
+
+    for fun, start, scale in ((by_time, [0.0], 1.0), (by_state, [0.0, -1.0], 1.2)):
+        sol = fl.solve_ivp(fun, (0.0, 1.6), start, **tight)
+        assert sol.success, sol.message
+        assert not [w for w in sol.warnings if w.code == "non_unique"]
+        t = np.linspace(0.8, 1.6, 41)
+        expected = -np.sign(t - 1) * np.abs(scale * (t - 1)) ** (1 / power)
+        assert np.abs(np.gradient(expected, t)).max() < 2.9
+        np.testing.assert_allclose(sol.sol(t)[0], expected, rtol=0, atol=1e-6)
+
+
 def test_finite_time_controller_with_fractional_powers_rests() -> None:
     def fun(t: float, x: Any) -> list[Any]:
         push = np.sign(x[0]) * np.abs(x[0]) ** (1 / 3)

@@ -80,6 +80,26 @@ def test_axes_are_used_and_returned(draw: Any, solution: fl.Solution) -> None:
         fl.plot.phase(solution, "x", "w")
 
 
+@pytest.mark.parametrize(
+    ("draw", "message"),
+    [
+        (lambda: fl.plot.surface(3), r"^parts: fl.surface_parts\(...\) is needed, not int"),
+        (
+            lambda: fl.plot.bifurcation_diagram(None, "v"),
+            r"^data: a Dataset of fl.analysis is needed, not NoneType",
+        ),
+        (lambda: fl.plot.branches(3), r"^branches: each is a Branch, as of fl.continuation, not int"),
+        (
+            lambda: fl.plot.branches([None]),
+            r"^branches: each is a Branch, as of fl.continuation, not NoneType",
+        ),
+    ],
+)
+def test_what_cannot_be_drawn_is_named(draw: Any, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        draw()
+
+
 def test_a_state_that_is_not_there_is_named_with_its_argument(solution: fl.Solution) -> None:
     alone = fl.solve_ivp(lambda t, x: [-np.sign(x[0])], (0, 2), [1.0])
     with pytest.raises(ValueError, match=r"^j: there is no state 1; the only one is x\[0\], which `plot`"):

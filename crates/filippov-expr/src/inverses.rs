@@ -61,31 +61,35 @@ fn with_own_roots_joined(graph: &mut Graph, form: &LinearForm) -> Option<NodeId>
     has_changed.then(|| LinearForm { terms, constant }.expression(graph))
 }
 
-/// `v |v|^p` as one power, if the second factor is that root.
-fn joined_with_own_root(graph: &mut Graph, v: NodeId, root: NodeId) -> Option<NodeId> {
+/// `k v |m v|^p` as `k/m sign(v) |m v|^(p + 1)`, if the second factor is that root.
+fn joined_with_own_root(graph: &mut Graph, kv: NodeId, root: NodeId) -> Option<NodeId> {
     let (base, exponent) = match *graph.node(root) {
         Node::Unary(UnaryOp::Sqrt, base) => (base, 0.5),
         Node::Binary(BinaryOp::Pow, base, p) => (base, graph.as_constant(p)?),
         _ => return None,
     };
-    let (v, factor) = LinearForm::of(graph, v).single_atom()?;
-    let size = match *graph.node(base) {
-        Node::Unary(UnaryOp::NotNegative, size) => size,
+    let inside = match *graph.node(base) {
+        Node::Unary(UnaryOp::NotNegative, inside) => inside,
         _ => base,
     };
-    let is_size = match *graph.node(size) {
-        Node::Binary(BinaryOp::Mul, _, inner) => {
-            graph.is_absolute_value(graph.node(size)) && (inner == v || inner == graph.neg(v))
-        }
-        _ => false,
+    let (v, k) = with_factor(graph, kv);
+    let (size, m) = with_factor(graph, inside);
+    let Node::Binary(BinaryOp::Mul, _, own) = *graph.node(size) else {
+        return None;
     };
-    if exponent < 0.0 || !is_size {
+    let is_size = graph.is_absolute_value(graph.node(size));
+    if exponent < 0.0 || m <= 0.0 || !is_size || own != v && own != graph.neg(v) {
         return None;
     }
-    let exponent = graph.constant(exponent + 1.0);
+    let (exponent, factor) = (graph.constant(exponent + 1.0), graph.constant(k / m));
     let (sign, power) = (graph.sign(v), graph.pow(base, exponent));
-    let (odd, factor) = (graph.mul(sign, power), graph.constant(factor));
+    let odd = graph.mul(sign, power);
     Some(graph.mul(factor, odd))
+}
+
+/// An expression as an expression and a number in front.
+fn with_factor(graph: &Graph, id: NodeId) -> (NodeId, f64) {
+    LinearForm::of(graph, id).single_atom().unwrap_or((id, 1.0))
 }
 
 /// The same, with the sign of the sum where that is defined: beyond the domain of the root it may have another one.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -92,6 +92,8 @@ def branches(
         If Matplotlib is not installed.
     InputError
         If a branch has no such quantity.
+    TypeError
+        If something is no branch.
     ValueError
         If there is nothing to draw, or not one label for each branch.
 
@@ -99,7 +101,11 @@ def branches(
     --------
     >>> axes = fl.plot.branches([cycles, equilibria], "alpha", "x[0]")  # doctest: +SKIP
     """
-    every: list[Any] = [drawn] if hasattr(drawn, "points") else list(drawn)
+    given = [drawn] if hasattr(drawn, "points") or not isinstance(drawn, Iterable) else drawn
+    every: list[Any] = list(given)
+    for branch in every:
+        if not hasattr(branch, "points"):
+            raise TypeError(f"branches: each is a Branch, as of fl.continuation, not {type(branch).__name__}")
     if not every:
         raise ValueError("branches: there is none to draw")
     if labels is not None and len(labels) != len(every):

@@ -176,6 +176,8 @@ def basins(
 
 
 def _along_obs(data: Any, name: str) -> Any:
+    if not hasattr(data, "data_vars"):
+        raise TypeError(f"data: a Dataset of fl.analysis is needed, not {type(data).__name__}")
     if name not in data or data[name].dims != ("obs",):
         known = [str(key) for key, value in data.data_vars.items() if value.dims == ("obs",)]
         raise ValueError(f"{name!r} is not a variable of the returns; they have {', '.join(known) or 'none'}")

@@ -48,7 +48,7 @@ def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legen
     ImportError
         If Matplotlib is not installed.
     TypeError
-        If `ax` does not have as many dimensions as the window.
+        If `parts` is something else; if `ax` does not have as many dimensions as the window.
 
     Examples
     --------
@@ -57,6 +57,8 @@ def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legen
     >>> parts = fl.surface_parts(friction, [(-2, 2), (-1, 1)])
     >>> axes = fl.plot.surface(parts, ax=fl.plot.phase(friction.solve((0, 9), [4, 0])))  # doctest: +SKIP
     """
+    if not isinstance(parts, SurfaceParts):
+        raise TypeError(f"parts: fl.surface_parts(...) is needed, not {type(parts).__name__}")
     in_space = len(parts.states) == 3
     fresh = ax is None
     ax = new_axes(ax, (6.4, 5.0) if in_space else (5.6, 4.2), dark, projection="3d" if in_space else None)

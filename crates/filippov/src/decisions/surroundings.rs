@@ -57,7 +57,11 @@ impl Surroundings {
                     .map(|(i, (g, x))| g.abs() * at.scale.size(i, *x))
                     .filter(|part| part.is_finite())
                     .sum();
-                largest = largest.max(TANGENT * (size + (partials.time * at.t).abs()));
+                let by_slope = TANGENT * (size + (partials.time * at.t).abs());
+                largest = largest.max(match by_slope <= fields.row_size(i) {
+                    true => by_slope,
+                    false => by_slope.min(change_nearby(at, j, &signs, partials.rate)?),
+                });
             }
             noise.push(largest);
         }
@@ -90,6 +94,24 @@ impl Surroundings {
         let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
         is_doubtful(&self.fields.restrict(&held), &noise)
     }
+}
+
+/// The change of the rate of h_j between the point and places that rounding cannot tell from it. At the kink of |c|^1.4 the slope
+/// of the rate is infinite, and this change is small. Infinite if the rate is known at none of these places.
+fn change_nearby(at: &Point, j: usize, signs: &[f64], rate: f64) -> Result<f64, FieldError> {
+    let (mut row, mut largest) = (vec![0.0; at.x.len()], None);
+    for shift in [TANGENT, -TANGENT] {
+        let states = at.x.iter().enumerate();
+        let x: Vec<f64> = states
+            .map(|(i, x)| x + shift * at.scale.size(i, *x))
+            .collect();
+        let place = at.place_at(at.t * (1.0 + shift), &x, signs);
+        let change = (at.system.rate_gradient(j, &place, &mut row)?.rate - rate).abs();
+        if change.is_finite() {
+            largest = Some(change.max(largest.unwrap_or(0.0)));
+        }
+    }
+    Ok(largest.unwrap_or(f64::INFINITY))
 }
 
 fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {
