@@ -44,7 +44,8 @@ pub(crate) fn without_root(graph: &mut Graph, form: &LinearForm) -> Option<(Node
     joined.or_else(|| solved_for_a_root(graph, form, true))
 }
 
-/// A sum in which `v |v|^p` is written as the sign of v times `|v|^(p + 1)`, which has a slope at v = 0; `None` without such terms.
+/// The sum with every `v |v|^p` as the sign of v times `|v|^(p + 1)`: the first form has no slope at v = 0 that can be computed.
+/// `None` if there is no such term.
 fn with_own_roots_joined(graph: &mut Graph, form: &LinearForm) -> Option<NodeId> {
     let mut terms = form.terms.clone();
     for term in &mut terms {
@@ -209,7 +210,7 @@ fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, 
                 let below = graph.all_below(&[term.argument]);
                 let is_cube =
                     |id: &NodeId| matches!(graph.node(*id), Node::Unary(UnaryOp::Cbrt, _));
-                // The root of |v| with the sign of v is as steep at its zero, and v itself is left beside the power.
+                // The root of |v| with the sign of v is as steep where it vanishes. Its inverse function leaves v, which has no kink.
                 let is_steep = below.iter().any(is_cube) || is_odd_root(graph, term);
                 odd_power(graph, &rest, sum, p, is_steep)?
             }
@@ -313,7 +314,7 @@ fn odd_power(
             graph.binary(BinaryOp::Hypot, c, zero)
         }
         false if p.fract() == 0.0 => graph.abs(c),
-        // A broken power has no value where the sign of c is not yet that of c.
+        // Close to its surface c may have another sign than the mode says. Then `abs(c)` is negative, and has no broken power.
         false => {
             let magnitude = graph.abs(c);
             graph.unary(UnaryOp::NotNegative, magnitude)

@@ -625,7 +625,7 @@ impl Tracer {
         }
     }
 
-    /// An arc: of a quotient or a sine a choice of angles that do not jump or bend.
+    /// An arc. That of a quotient or of a wave is a choice between two angles, each of which is smooth.
     pub fn arc(&mut self, op: UnaryOp, argument: NodeId) -> Result<NodeId, Refused> {
         let Some((y, x)) = legs_of_arc(&mut self.graph, op, argument) else {
             return Ok(self.unary(op, argument));

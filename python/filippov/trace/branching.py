@@ -482,7 +482,10 @@ class Tracer:
         return root
 
     def arc(self, op: str, argument: int) -> int:
-        """Return the node of an arc: of a quotient or a sine a choice of angles that do not jump or bend."""
+        """Return the node of an arc.
+
+        That of a quotient or of a wave is a choice between two angles, each of which is smooth.
+        """
         builder = self.builder
         legs = builder.legs_of_arc(op, argument)
         if legs is None:

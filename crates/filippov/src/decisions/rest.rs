@@ -33,13 +33,11 @@ pub(super) fn stay_if_nothing_leaves(
             }
         }
     }
-    // Beside the surfaces rounding of the place makes slopes, as of |v|^0.4.
+    // On the surfaces |v|^0.4 is zero. At the place it may not be: rounding makes 1e-12 of it where v is 1e-30.
     let (mut x, signs) = (at.x.to_vec(), meeting.mode.signs());
     let (mut projector, setting) = (at.projector(), at.setting(&signs));
     projector.project_onto(at.system, meeting.surfaces, at.t, &mut x, setting)?;
-    let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
-    let is_near = at.scale.largest(&shift, at.x) <= 1.0;
-    let at = &at.moved(at.t, if is_near { &x } else { at.x });
+    let at = &at.moved(at.t, if is_near(at, &x) { &x } else { at.x });
     let meeting = &meeting.with_surfaces(meeting.surfaces);
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
         let velocity = at.velocity(notes, &stays.mode, &[])?;
@@ -92,7 +90,6 @@ pub(crate) fn rest_within_tolerance(
     let mut x = at.x.to_vec();
     let mut projector = at.projector();
     projector.project_onto_rates(at.system, &surfaces, at.t, &mut x, at.setting(signs))?;
-    let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
     let there = at.moved(at.t, &x);
     let h = there.surface_values(notes, signs)?;
     let mut row = vec![0.0; at.x.len()];
@@ -103,13 +100,18 @@ pub(crate) fn rest_within_tolerance(
             return Ok(None);
         }
     }
-    let is_near = at.scale.largest(&shift, at.x) <= 1.0;
-    if !is_near {
+    if !is_near(at, &x) {
         return Ok(None);
     }
     let meeting = Meeting::new(at.arrival.mode, &surfaces, &surfaces, How::Limit);
     let next = stay_if_nothing_leaves(&there, notes, &meeting)?;
     Ok(next.map(|next| RestingPlace { x, surfaces, next }))
+}
+
+/// Is the state within the tolerance of the point?
+fn is_near(at: &Point, x: &[f64]) -> bool {
+    let shift: Vec<f64> = x.iter().zip(at.x).map(|(x, before)| x - before).collect();
+    at.scale.largest(&shift, at.x) <= 1.0
 }
 
 /// Does a component of the state grow, or fall, by the fields of all regions? Then zero is not among their combinations.
