@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, Runs, solve_many
+from filippov._core import Run, Runs, TracedEvent, solve_many
 from filippov.arrays import finite_array, real_array
 from filippov.core_events import CoreEvent, core_events
 from filippov.derivatives import FORWARD_ONLY, Wanted, check_wrt, refuse_without_derivatives
@@ -20,7 +20,7 @@ from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
 from filippov.options import OPTIONS, check_options, check_t_span, in_order
 from filippov.outputs import at_ends, refuse_outputs_that_fail
-from filippov.prepare import Prepared
+from filippov.prepare import Prepared, n_alike
 from filippov.progress import Progress, report_of_members
 from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
@@ -346,7 +346,8 @@ def _groups(
     """Return the members in groups, usually one.
 
     A function that branches on parameter values, or cannot be traced, is prepared for every combination of
-    values anew, and an event that cannot be traced is called with those of its members.
+    values anew, one of which a value switches a comparison off for that value; and an event that cannot be
+    traced is called with the values of its members.
     """
     count = len(states)
     groups: list[_Group] = []
@@ -357,10 +358,11 @@ def _groups(
         prepared, events = core_events(specs, system, prepared, t0, states[start], (), values)
         if start == 0 and system.outputs:
             refuse_outputs_that_fail(system, prepared, t0, states[start].copy(), values)
-        stop = count
-        if prepared.pinned is not None or any(callable(event[0]) for event in events):
-            differs = (table[start:] != table[start]).any(axis=1)
-            stop = start + int(differs.argmax()) if differs.any() else count
+        rest = np.ascontiguousarray(table[start:])
+        held = [prepared.n_valid(rest)]
+        for g, *_ in events:
+            held.append(g.n_valid(rest) if isinstance(g, TracedEvent) else n_alike(rest))
+        stop = start + max(min(held), 1)
         groups.append(_Group(slice(start, stop), prepared, events))
         start = stop
     return groups

@@ -23,7 +23,7 @@ from filippov.trace.memory import remembered
 from filippov.trace.reuse import Recent
 from filippov.trace.verify import verify
 
-__all__ = ["MEMORY", "Prepared", "prepare"]
+__all__ = ["MEMORY", "Prepared", "n_alike", "prepare"]
 
 Array = npt.NDArray[np.float64]
 # The code of the warning for a function that assigns what other calls of it may read.
@@ -116,7 +116,29 @@ class Prepared(NamedTuple):
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
-        return self.core.n_states == n and (self.pinned is None or self.pinned == values)
+        if self.core.n_states != n or (self.pinned is not None and self.pinned != values):
+            return False
+        return self.pinned is not None or self.n_valid(parameter_vector(values)[np.newaxis]) > 0
+
+    def n_valid(self, table: Array) -> int:
+        """Return for how many of the first rows of parameter values, (k, p), this form holds.
+
+        If it holds for some values only, these are taken to be the first row. If it holds for others too, it
+        ends at a row that switches a comparison off, as p = 0 does that of ``p * x`` with 0.
+        """
+        if self.pinned is not None:
+            return n_alike(table)
+        if not isinstance(self.core, TracedSystem):
+            return len(table)
+        table = np.ascontiguousarray(table)
+        own = self.core.n_rows_without_number(table)
+        return own if self.trace is None else min(own, self.trace.n_rows_without_number(table))
+
+
+def n_alike(table: Array) -> int:
+    """Return how many of the first rows are the same."""
+    differs = (table != table[0]).any(axis=1)
+    return int(differs.argmax()) if differs.any() else len(table)
 
 
 def prepare(

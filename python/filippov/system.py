@@ -558,8 +558,11 @@ class System(Points, Saving):
             return known
         if self._source is None:
             raise ModelError(
-                "the function branches on parameter values, and it did not travel with the system; "
-                f"this copy is valid for {known.pinned if known else {}} only"
+                "the function has another form for these values of the parameters, and it "
+                f"did not travel with the system; this copy is valid for {known and known.pinned} only"
+                if known is None or known.pinned
+                else "these values of the parameters switch off a comparison of the function, which "
+                "did not travel with the system"
             )
         prepared = prepare(self._source, n, values, self._states, t0, y0)
         warn_user(prepared.doubts)

@@ -41,7 +41,64 @@ struct Term {
 /// An expression with the same sign as a sum, times `+-1`, in which one root less stands; `None` if no root can be taken away.
 pub(crate) fn without_root(graph: &mut Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
     let joined = with_own_roots_joined(graph, form).map(|joined| (joined, 1.0));
-    joined.or_else(|| solved_for_a_root(graph, form, true))
+    joined
+        .or_else(|| base_of_odd_powers(graph, form))
+        .or_else(|| solved_for_a_root(graph, form, true))
+}
+
+/// The v of a sum of odd powers `sign(v) |v|^p` of the same v, and of v itself, whose coefficients have one sign.
+fn base_of_odd_powers(graph: &Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
+    let mut rest = LinearForm {
+        terms: Vec::new(),
+        constant: form.constant,
+    };
+    let mut found: Option<(NodeId, f64)> = None;
+    for &(atom, coefficient) in &form.terms {
+        match base_of_odd_power(graph, atom) {
+            Some(v) => {
+                let (known, sense) = *found.get_or_insert((v, coefficient.signum()));
+                if known != v || sense * coefficient < 0.0 {
+                    return None;
+                }
+            }
+            None => rest.terms.push((atom, coefficient)),
+        }
+    }
+    let (v, sense) = found?;
+    let whole = LinearForm::of(graph, v);
+    let is_multiple = match (rest.key(), whole.key()) {
+        (Some((rest, leading)), Some((whole, own))) => {
+            rest.matches(&whole) && sense * leading * own > 0.0
+        }
+        _ => rest.is_zero(),
+    };
+    is_multiple.then_some((v, sense))
+}
+
+/// The v of `sign(v) |m v|^p`.
+fn base_of_odd_power(graph: &Graph, atom: NodeId) -> Option<NodeId> {
+    let Node::Binary(BinaryOp::Mul, sign, power) = *graph.node(atom) else {
+        return None;
+    };
+    let base = match *graph.node(power) {
+        Node::Unary(UnaryOp::Sqrt, base) => base,
+        Node::Binary(BinaryOp::Pow, base, p) if graph.as_constant(p)? > 0.0 => base,
+        Node::Binary(BinaryOp::Mul, v, same) => {
+            let is_own =
+                matches!(*graph.node(sign), Node::Sign(j) if v == same && graph.surface(j) == v);
+            return is_own.then_some(v);
+        }
+        _ => return None,
+    };
+    let inside = match *graph.node(base) {
+        Node::Unary(UnaryOp::NotNegative, inside) => inside,
+        _ => base,
+    };
+    let (size, factor) = with_factor(graph, inside);
+    match *graph.node(size) {
+        Node::Binary(BinaryOp::Mul, own, v) if own == sign && factor > 0.0 => Some(v),
+        _ => None,
+    }
 }
 
 /// The sum with every `v |v|^p` as the sign of v times `|v|^(p + 1)`: the first form has no slope at v = 0 that can be computed.

@@ -4,12 +4,57 @@ use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
 use crate::node::{Facts, Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
 
 impl Graph {
     /// Whether the value varies along a motion: it contains the time, a state, a sign or an input.
     /// `false` means constants and parameters only.
     pub fn depends_on_motion(&self, id: NodeId) -> bool {
         self.facts(id).varies
+    }
+
+    /// The number that a value is for these parameters, at every time and state; `None` if it is none.
+    ///
+    /// It is one without a motion in it, and where parameters switch off all that moves: `p x` where p = 0, and `x - p x`
+    /// where p = 1.
+    pub fn value_at(&self, root: NodeId, parameters: &[f64]) -> Option<f64> {
+        // A value as a multiple of another one; of none if it is a number.
+        let mut known: FxHashMap<NodeId, (f64, Option<NodeId>)> = FxHashMap::default();
+        // One quotient for each divisor: others are multiples of it.
+        let mut quotients: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in self.all_below(&[root]) {
+            let at = |operand: NodeId| known[&operand];
+            let value = match *self.node(id) {
+                Node::Constant(value) => (value, None),
+                Node::Parameter(k) => match parameters.get(k as usize) {
+                    Some(&value) => (value, None),
+                    None => (1.0, Some(id)),
+                },
+                Node::Unary(op, a) => match (op, at(a)) {
+                    (_, (a, None)) => (op.apply(a), None),
+                    (UnaryOp::Neg, (k, of)) => (-k, of),
+                    _ => (1.0, Some(id)),
+                },
+                Node::Binary(op, a, b) => match (op, at(a), at(b)) {
+                    (_, (a, None), (b, None)) => (op.apply(a, b), None),
+                    (BinaryOp::Add | BinaryOp::Sub, (a, of), (b, same)) if of == same => {
+                        (op.apply(a, b), of)
+                    }
+                    (BinaryOp::Mul, (a, None), (b, of)) | (BinaryOp::Mul, (b, of), (a, None)) => {
+                        (a * b, of)
+                    }
+                    (BinaryOp::Div, (a, of), (b, None)) => (a / b, of),
+                    (BinaryOp::Div, (a, None), _) => (a, Some(*quotients.entry(b).or_insert(id))),
+                    (BinaryOp::Pow, _, (0.0, None)) => (1.0, None),
+                    _ => (1.0, Some(id)),
+                },
+                _ => (1.0, Some(id)),
+            };
+            let is_number = value.0 == 0.0 || value.1.is_none();
+            known.insert(id, (value.0, value.1.filter(|_| !is_number)));
+        }
+        let (value, of) = known[&root];
+        of.is_none().then_some(value)
     }
 
     /// Whether one of the values contains the time.

@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use filippov_expr::{
     legs_of_arc, roots, BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp,
 };
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -33,6 +34,24 @@ impl Builder {
             Err(PyValueError::new_err(format!("no node {id} in this graph")))
         }
     }
+}
+
+/// How many of the first rows of parameters leave none of these nodes a number.
+pub fn n_rows_without_number(
+    graph: &Graph,
+    nodes: &[NodeId],
+    table: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<usize> {
+    let (count, width) = (table.shape()[0], table.shape()[1]);
+    if width == 0 {
+        return Ok(count);
+    }
+    let mut rows = table.as_slice()?.chunks(width);
+    let is_number = |row: &[f64]| {
+        let mut values = nodes.iter().map(|&node| graph.value_at(node, row));
+        values.any(|value| value.is_some())
+    };
+    Ok(rows.position(is_number).unwrap_or(count))
 }
 
 #[pymethods]
@@ -182,6 +201,22 @@ impl Builder {
     fn depends_on_motion(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         Ok(graph.depends_on_motion(Self::node(&graph, a)?))
+    }
+
+    fn value_at(&self, a: u32, parameters: Vec<f64>) -> PyResult<Option<f64>> {
+        let graph = self.graph();
+        Ok(graph.value_at(Self::node(&graph, a)?, &parameters))
+    }
+
+    fn n_rows_without_number(
+        &self,
+        nodes: Vec<u32>,
+        table: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<usize> {
+        let graph = self.graph();
+        let nodes = nodes.into_iter().map(|id| Self::node(&graph, id));
+        let nodes = nodes.collect::<PyResult<Vec<_>>>()?;
+        n_rows_without_number(&graph, &nodes, &table)
     }
 
     fn depends_on_state(&self, a: u32) -> PyResult<bool> {

@@ -10,12 +10,12 @@ use filippov::{
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Interval, Motion, NodeId, Program,
 };
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use smallvec::SmallVec;
 
-use crate::builder::Builder;
+use crate::builder::{n_rows_without_number, Builder};
 use crate::conversion::{read_scalar, read_vector};
 
 /// Python switching functions h_j(t, x).
@@ -333,21 +333,55 @@ impl EventPart {
 #[pyclass(frozen, module = "filippov._core")]
 pub struct TracedEvent {
     pub expression: Arc<EventExpression>,
+    /// It holds for one set of values only.
+    is_pinned: bool,
+    /// What it asked about that other values of the parameters may make a number.
+    moving: Vec<NodeId>,
+    graph: Graph,
 }
 
 #[pymethods]
 impl TracedEvent {
     #[new]
-    fn new(builder: &Builder, node: u32, levels: Vec<u32>, n_given: usize) -> PyResult<Self> {
+    fn new(
+        builder: &Builder,
+        node: u32,
+        levels: Vec<u32>,
+        n_given: usize,
+        is_pinned: bool,
+        moving: Vec<u32>,
+    ) -> PyResult<Self> {
         let graph = builder.graph();
         let root = Builder::node(&graph, node)?;
-        let levels = levels.into_iter().map(|id| Builder::node(&graph, id));
-        let levels = levels.collect::<PyResult<Vec<_>>>()?;
+        let nodes = |ids: Vec<u32>| {
+            ids.into_iter()
+                .map(|id| Builder::node(&graph, id))
+                .collect()
+        };
+        let levels: PyResult<Vec<NodeId>> = nodes(levels);
+        let (levels, moving) = (levels?, nodes(moving)?);
         let expression = EventExpression::compile(&graph, root, &levels, n_given)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
         Ok(TracedEvent {
             expression: Arc::new(expression),
+            is_pinned,
+            graph: match moving.is_empty() {
+                true => Graph::new(),
+                false => graph.clone(),
+            },
+            moving,
         })
+    }
+
+    /// For how many of the first rows of parameters it holds; for the first it does.
+    fn n_valid(&self, table: PyReadonlyArray2<'_, f64>) -> PyResult<usize> {
+        if !self.is_pinned {
+            return n_rows_without_number(&self.graph, &self.moving, &table);
+        }
+        let rows = table.as_array();
+        let differs = |row: &_| *row != rows.row(0);
+        let first = rows.rows().into_iter().position(|row| differs(&row));
+        Ok(first.unwrap_or(rows.nrows()))
     }
 
     /// The value with these parameters and discrete states; none within rounding of a zero inside of it.

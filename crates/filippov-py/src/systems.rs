@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use filippov::derivative::Extension;
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
-    field_off_surfaces, Definition, Error, FieldError, Law, Laws, Mode, OffSurfaces,
-    PiecewiseSystem, Rules, Setting, SignStructure,
+    field_off_surfaces, surfaces_of_rounding, Definition, Error, FieldError, Law, Laws, Mode,
+    OffSurfaces, PiecewiseSystem, Rules, Setting, SignStructure,
 };
 use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names, Regions};
@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::black_boxes::{OpaqueSystem, SignedSystem};
-use crate::builder::Builder;
+use crate::builder::{n_rows_without_number, Builder};
 use crate::laws::{read_law, LawRow};
 
 pub type Array<'py> = PyReadonlyArray1<'py, f64>;
@@ -464,6 +464,14 @@ impl TracedSystem {
         Ok(found.map_err(raised)?.map(as_arrays))
     }
 
+    /// The surfaces whose functions are nothing but rounding at a point: see `surfaces_of_rounding` of the core.
+    fn surfaces_of_rounding(&self, t: f64, x: Array<'_>, p: Array<'_>) -> PyResult<Vec<usize>> {
+        let x = x.as_slice()?;
+        let (system, q) = self.at(p.as_slice()?, t, x)?;
+        let complete = |seen: &[f64]| self.all_signs((&system, &q), t, x, seen);
+        surfaces_of_rounding(&system, self.n_visible(), complete, &q, (t, x)).map_err(raised)
+    }
+
     #[allow(clippy::too_many_arguments)]
     fn sliding_field<'py>(
         &self,
@@ -495,6 +503,14 @@ impl TracedSystem {
 
     fn switches_at(&self, surface: usize) -> bool {
         surface < self.system.n_surfaces() && self.system.switches_at(surface)
+    }
+
+    /// How many of the first rows of parameters leave no switching function a number that moves for others.
+    fn n_rows_without_number(&self, table: PyReadonlyArray2<'_, f64>) -> PyResult<usize> {
+        let graph = self.system.graph();
+        let surfaces = (0..self.n_visible()).map(|j| graph.surface(j as u32));
+        let moving: Vec<_> = surfaces.filter(|&h| graph.depends_on_motion(h)).collect();
+        n_rows_without_number(graph, &moving, &table)
     }
 
     /// Whether the field may jump at a surface in a mode; if not, the field has a kink there, or is smooth.

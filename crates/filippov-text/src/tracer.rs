@@ -734,17 +734,10 @@ impl Tracer {
     /// The value of an expression of constants and parameters; `None` if it changes in a run.
     pub fn known_value(&mut self, node: NodeId) -> Option<f64> {
         let constant = self.graph.as_constant(node);
-        let changes = self.graph.depends_on_motion(node) || Laws::is_held(self, node);
-        if constant.is_some() || changes {
-            return constant;
+        match constant.is_some() || Laws::is_held(self, node) {
+            true => constant,
+            false => self.graph.value_at(node, &self.values),
         }
-        let mut copy = self.graph.clone();
-        let values = (0..).zip(&self.values);
-        let images: Vec<(NodeId, NodeId)> = values
-            .map(|(index, &value)| (copy.parameter(index), copy.constant(value)))
-            .collect();
-        let value = copy.substituted(node, &images);
-        copy.as_constant(value)
     }
 
     /// Remembers a question.

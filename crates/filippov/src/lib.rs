@@ -110,9 +110,9 @@ pub use error_scale::Units;
 pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, equations, field_off_surfaces, hidden_dynamics, intersection_field,
-    message_of, not_finite, state_after, state_text, Classification, Dip, Equations, GuardRates,
-    HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, ItineraryLeg, Leg, LegEnd, LegError,
-    NotFinitePlace, OffSurfaces, Passage, PointKind, Unknowns,
+    message_of, not_finite, state_after, state_text, surfaces_of_rounding, Classification, Dip,
+    Equations, GuardRates, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, ItineraryLeg,
+    Leg, LegEnd, LegError, NotFinitePlace, OffSurfaces, Passage, PointKind, Unknowns,
 };
 pub use integrate::{Integrator, Problem, Reached, ReplayError};
 pub use mode::{Mode, Signs};

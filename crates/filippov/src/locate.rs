@@ -82,7 +82,11 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         mut slope,
     } = bracket;
     let mut previous = None;
-    let mut at = guess.clamp(lo, hi);
+    // A guess may lie at an end to rounding, where the values differ by orders of magnitude.
+    let mut at = match guess > lo && guess < hi {
+        true => guess,
+        false => 0.5 * (lo + hi),
+    };
     let length = hi - lo;
     let mut last_move = length;
     let mut steepest = slope.abs();
@@ -103,17 +107,27 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
             None => 1.0,
             Some(_) => ((chord - slope) / chord).abs().max(step / length).min(1.0),
         };
-        if inside && step * doubt <= 0.5 * width.max(EPS * hi.abs()) {
-            return Ok(Located {
-                theta: secant,
-                residual: value.abs() * doubt,
-                slope: steepest,
-            });
+        let resolved = width.max(EPS * hi.abs());
+        let mut converges = inside && step <= 0.5 * last_move;
+        if inside && step * doubt <= 0.5 * resolved {
+            let is_zero = value.abs() >= EPS * g_lo.max(-g_hi) || {
+                // The slope is that of values so much larger that it tells nothing of this one.
+                let ahead = secant + value.signum() * resolved;
+                let beyond = g(ahead.clamp(lo, hi))?;
+                (beyond > 0.0) != (value > 0.0)
+            };
+            if is_zero {
+                return Ok(Located {
+                    theta: secant,
+                    residual: value.abs() * doubt,
+                    slope: steepest,
+                });
+            }
+            converges = false;
         }
-        let next = if inside && step <= 0.5 * last_move {
-            secant
-        } else {
-            0.5 * (lo + hi)
+        let next = match converges {
+            true => secant,
+            false => 0.5 * (lo + hi),
         };
         last_move = (next - at).abs();
         (previous, slope) = (Some((at, value)), chord);

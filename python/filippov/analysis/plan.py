@@ -31,6 +31,7 @@ from filippov.errors import InputError, Interrupted
 from filippov.options import Options
 from filippov.outputs import Output, traced_outputs
 from filippov.prepare import Prepared
+from filippov.sliding_policy import fit_kappa
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -267,12 +268,17 @@ class Plan(NamedTuple):
 
     def _place_for(self, prepared: Prepared, y0: Array, p: Array) -> Place | None | Exception:
         """Return the section for a system that holds for some parameter values only."""
+        try:
+            fit_kappa(self.options.sliding, prepared.surfaces)
+        except InputError as error:
+            return error
+        if self.observed is None:
+            return None
         if len(prepared.surfaces) != len(self.prepared.surfaces):
+            # The returns of all points have modes in one table, a column for each surface.
             return InputError(
                 "the function has other surfaces for these parameter values; make a sweep for each side"
             )
-        if self.observed is None:
-            return None
         values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
         section, t0 = self.observed.section, self.t_span[0]
         try:

@@ -21,9 +21,13 @@ from filippov.prepare import MEMORY, Prepared
 from filippov.saving import packed, unpacked
 
 if TYPE_CHECKING:
+    from filippov.analysis.grid import Grid
     from filippov.system import System
 
-__all__ = ["WARNINGS", "Observation", "Table", "Task", "concatenate", "not_run", "prepare_for", "run_task"]
+__all__ = [
+    *("WARNINGS", "Observation", "Table", "Task"),
+    *("concatenate", "not_run", "prepare_for", "prepare_for_all", "run_task"),
+]
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]
@@ -249,7 +253,9 @@ def concatenate(tables: Sequence[Table]) -> Table:
         if isinstance(tables[0][name], list):
             joined[name] = [text for table in tables for text in table[name]]
         else:
-            joined[name] = np.concatenate([table[name] for table in tables])
+            rows = [table[name] for table in tables]
+            # Points without returns have no modes, and may have other surfaces.
+            joined[name] = np.concatenate([row for row in rows if len(row)] or rows[:1])
     return joined
 
 
@@ -262,6 +268,22 @@ def prepare_for(system: System, t0: float, y0: Array, values: dict[str, float]) 
         if defaults == values:
             raise
         return system.prepare(len(y0), t0, None, defaults)
+
+
+def prepare_for_all(system: System, t0: float, grid: Grid) -> Prepared:
+    """Return the system of the core, traced at a point of the sweep: one that holds for all points, if any.
+
+    At the first point a parameter may be zero, and switch off a comparison that there is at the last one.
+    """
+    prepared = prepare_for(system, t0, *grid.first())
+    if prepared.pinned is None:
+        return prepared
+    y0, p = grid.rows(grid.n_points - 1, grid.n_points)
+    try:
+        other = system.prepare(y0.shape[1], t0, y0[0], dict(zip(grid.names, p[0].tolist(), strict=True)))
+    except Exception:
+        return prepared
+    return prepared if other.pinned is not None else other
 
 
 def outputs_for(
@@ -301,17 +323,17 @@ def groups_of(
     A function that branches on parameter values, or cannot be traced, is prepared for every combination of
     values anew; where that fails, the error stands in the place of the system.
     """
-    if prepared.pinned is None:
+    if prepared.pinned is None and prepared.n_valid(p) == len(y0):
         return [(slice(0, len(y0)), prepared)]
     groups: list[tuple[slice, Prepared | Exception]] = []
     start = 0
     while start < len(y0):
-        end = start + 1
-        while end < len(y0) and np.array_equal(p[end], p[start]):
-            end += 1
         values = dict(zip(names, p[start].tolist(), strict=True))
+        end = start + 1
         try:
-            own: Prepared | Exception = system.prepare(y0.shape[1], t0, y0[start].copy(), values)
+            prepared = system.prepare(y0.shape[1], t0, y0[start].copy(), values)
+            own: Prepared | Exception = prepared
+            end = start + max(prepared.n_valid(p[start:]), 1)
         except FilippovError as error:
             own = error
         except (ArithmeticError, ValueError, IndexError, KeyError, TypeError) as error:

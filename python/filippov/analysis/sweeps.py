@@ -13,7 +13,7 @@ from filippov.analysis.grid import check_size, grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
 from filippov.analysis.plan import Piece, Plan, plan_of
-from filippov.analysis.points import Table, concatenate, prepare_for
+from filippov.analysis.points import Table, concatenate, prepare_for_all
 from filippov.analysis.schedule import as_executor, count_points, run_pieces
 from filippov.ensemble import check_threads
 from filippov.errors import InputError, Interrupted
@@ -167,7 +167,7 @@ def sweep(
             longest_period=longest_period,
             modulo=modulo,
         )
-    prepared = prepare_for(system, span[0], *grid.first())
+    prepared = prepare_for_all(system, span[0], grid)
     fit_kappa(checked.sliding, prepared.surfaces)
     plan = plan_of(system, grid, prepared, observed, checked, span, last is not None, units or {})
     found = run_plan(plan, store, executor, threads, chunk_size, part, progress)

@@ -18,7 +18,7 @@ from filippov.analysis.dataset import coordinates_of
 from filippov.analysis.grid import Grid, check_size, grid_of
 from filippov.analysis.observe import check_keywords, check_system, options_of, span_of
 from filippov.analysis.optional import need
-from filippov.analysis.points import Task, end_times, groups_of, prepare_for, run_task
+from filippov.analysis.points import Task, end_times, groups_of, prepare_for_all, run_task
 from filippov.analysis.sections import AnySection, Phase, as_section, clocks_of
 from filippov.caution import warn_user
 from filippov.cycles.motions import Array
@@ -133,8 +133,7 @@ def lyapunov(
     check_size(grid, has_store=False)
     span = span_of(t_span, section, number is not None)
     checked = options_of({**options, "progress": None}, span, len(grid.states))
-    state, values = grid.first()
-    prepared = prepare_for(system, span[0], state, values)
+    prepared = prepare_for_all(system, span[0], grid)
     refuse_without_derivatives(prepared, argument="system")
     if system.discrete:
         names = ", ".join(system.discrete)

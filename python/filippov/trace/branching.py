@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from filippov._core import Regions, TracedSystem
+from filippov._core import Regions
 from filippov.errors import TraceError
 from filippov.trace.array import TracedArray, apply_ufunc
 from filippov.trace.array_functions import apply_function
@@ -182,6 +182,8 @@ class Tracer:
         self._continued: dict[int, int] = {}
         self.ends_of_roots: list[int] = []
         self._roots: dict[int, tuple[int, Callable[[int], int] | None]] = {}
+        # Numerators of the quotients inside of arcs.
+        self._divided: dict[int, None] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -491,6 +493,9 @@ class Tracer:
         if legs is None:
             return builder.unary(op, argument)
         y, x = legs
+        self._divided[y] = None
+        if op == "arctan" and self.known_value(y) == 0.0:
+            return builder.constant(self.known_sign(y) or 0.0)
         opposite = builder.unary("negative", y) if op == "arctan" else y
         behind = builder.binary("arctan2", opposite, builder.unary("negative", x))
         angle = self.choose(x, builder.binary("arctan2", y, x), behind)
@@ -578,13 +583,24 @@ class Tracer:
         return int(value)
 
     def known_value(self, node: int) -> float | None:
-        """Return the value of an expression of constants and parameters; None if it changes in a run."""
+        """Return the value of an expression of constants and parameters; None if it changes in a run.
+
+        Parameters may switch off all that moves, as p = 0 does in ``p * x``.
+        """
         constant = self.builder.as_constant(node)
-        if constant is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
+        if constant is not None or self.laws.is_held(self, node):
             return constant
-        system = TracedSystem(self.builder, [node] * self.n_states, self.n_states, self.names(), self.states)
-        signs = np.ones(self.builder.n_surfaces())
-        return float(system.field(self.t0, self.y0, signs, self.values)[0])
+        return self.builder.value_at(node, self.values.tolist())
+
+    def moving(self) -> list[int]:
+        """Return what the function asked about that other values of the parameters may make a number."""
+        nodes = dict.fromkeys([question.node for question in self.questions] + list(self._divided))
+        values = self.values.tolist()
+        return [
+            node
+            for node in nodes
+            if self.builder.parameters_read(node) and self.builder.value_at(node, values) is None
+        ]
 
     # -------------------------------------------------------------- branching
 

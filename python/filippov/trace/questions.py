@@ -7,21 +7,28 @@ compared quantity is identically zero in some region is not always found out.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
 
 from filippov.errors import TraceError
 from filippov.trace.branching import MOST_COMBINATIONS, Question
 from filippov.trace.explain import BLACK_BOX, UserLine
+from filippov.trace.verify import points_around
 
 if TYPE_CHECKING:
-    from filippov._core import Regions
+    from filippov._core import Regions, TracedSystem
     from filippov.trace.branching import Tracer
 
-__all__ = ["Again", "check_questions", "is_exact_at_an_instant"]
+__all__ = ["Again", "check_questions", "doubts_of_rounding", "is_exact_at_an_instant"]
 
 # Characters of an expression that are printed in a message.
 MOST_PRINTED = 160
+
+# So many points around the start are looked at. If so many of them are in a region, it is seen.
+_N_LOOKED_AT, _N_DOUBTFUL = 12, 3
 
 
 class Roots(NamedTuple):
@@ -83,6 +90,26 @@ def check_questions(tracer: Tracer, roots: Roots, role: str, again: Again | None
     for surface in range(tracer.builder.n_surfaces() - tracer.laws.n_guards):
         check.surface(surface)
     tracer.guard_regions(check.regions.used_parameters, check.regions.is_at_border)
+    return tuple(check.doubts)
+
+
+def doubts_of_rounding(
+    tracer: Tracer, system: TracedSystem, roots: Roots, role: str, again: Again | None = None
+) -> tuple[str, ...]:
+    """Return what is doubted of comparisons whose sign is that of rounding at some points around the start.
+
+    There two quantities are equal that no term by term analysis shows to be so, as ``np.arccos(np.cos(x))``
+    and x are.
+    """
+    counts = Counter[int]()
+    with np.errstate(all="ignore"):
+        for t, x in points_around(tracer.t0, tracer.y0, _N_LOOKED_AT):
+            counts.update(system.surfaces_of_rounding(t, x, tracer.values))
+    doubtful = sorted(surface for surface, count in counts.items() if count >= _N_DOUBTFUL)
+    if not doubtful:
+        return ()
+    check = _Check(tracer, roots, role, again)
+    check.doubt_rounding([(surface, counts[surface]) for surface in doubtful])
     return tuple(check.doubts)
 
 
@@ -150,6 +177,21 @@ class _Check:
             "it is, the comparison is not decided as Python does there; compare with a number that it "
             "never takes"
             f"{_at(self.line_of(first))}"
+        )
+
+    def doubt_rounding(self, counts: Sequence[tuple[int, int]]) -> None:
+        """Doubt the comparisons whose signs are those of rounding at so many points, by one text."""
+        used = [(surface, count) for surface, count in counts if self._is_used(surface)]
+        if not used:
+            return
+        (surface, count), more = used[0], len(used) - 1
+        others = f" (and {more} other comparison{'s' * (more > 1)})" if more else ""
+        asked = [question for question in self.tracer.questions if self._surface_of(question) == surface]
+        line = self.line_of(asked[0]) if asked else None
+        self.doubts.append(
+            f"{self.role}: {self._short(self.regions.function(surface, []))}{others} is 0 up to rounding at "
+            f"{count} of {_N_LOOKED_AT} points around the start: its sign means nothing there. Compare with "
+            f"a number that it does not take in a whole region{_at(line)}"
         )
 
     def surface(self, surface: int) -> None:

@@ -18,7 +18,7 @@ from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.constants_of_motion import NO_CONSTANTS, ConstantsOfMotion
 from filippov.trace.explain import NoSuchLaw, NotTraceable, explain_failure, explain_raise
-from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant
+from filippov.trace.questions import Roots, check_questions, doubts_of_rounding, is_exact_at_an_instant
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify, verify_event
@@ -75,6 +75,8 @@ class Trace:
         For each end of a root that is a surface its index, and the sign of the side where the root is.
     root_ends : str
         How such roots go on, as in a `Source`.
+    moving : tuple of int
+        What the functions asked about that other values of the parameters may make a number.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
     """
@@ -93,7 +95,12 @@ class Trace:
     has_roots: bool = False
     ends: tuple[tuple[int, float], ...] = ()
     root_ends: str = ""
+    moving: tuple[int, ...] = ()
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
+
+    def n_rows_without_number(self, table: NDArray[np.float64]) -> int:
+        """Return how many of the first rows of parameters switch no comparison off, as ``p * x > 0``."""
+        return self.builder.n_rows_without_number(list(self.moving), table)
 
     @property
     def borders(self) -> tuple[str, ...]:
@@ -227,6 +234,7 @@ def trace(
     tracer.laws.idle = frozenset(system.idle_laws())
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
+    doubts += doubts_of_rounding(tracer, system, roots, "fun", again)
     return Trace(
         builder=tracer.builder,
         field=field,
@@ -242,6 +250,7 @@ def trace(
         has_roots=tracer.has_roots(field),
         ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
         root_ends=root_ends,
+        moving=tuple(tracer.moving()),
     )
 
 
@@ -346,7 +355,8 @@ def _beside(
         if own.laws.may_be_idle(tracer) or (is_event and tracer.laws_read & own.laws.idle):
             return OWN_LAW
         check_questions(tracer, Roots([node]), "event")
-        event = TracedEvent(builder, node, list(tracer.own_levels), len(tracer.names()))
+        levels, is_pinned = list(tracer.own_levels), bool(tracer.guards)
+        event = TracedEvent(builder, node, levels, len(tracer.names()), is_pinned, tracer.moving())
         keywords = _named(g, dict(values), "event")
         if not own.laws.names:
             verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)

@@ -112,6 +112,8 @@ def _arctan2(y: Any, x: Any) -> Any:
     is_right = x >= 0
     if is_right is True:
         return angle(y, x)
+    if type(y) is Scalar and y.tracer.known_sign(y.node) == 0.0:
+        return choose(is_right, 0.0, math.pi)
     left = choose(y >= 0, 0.5 * math.pi - angle(x, y), angle(x, -y) - 0.5 * math.pi)
     return choose(is_right, angle(y, x), left)
 

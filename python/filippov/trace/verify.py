@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from filippov._core import TracedEvent, TracedSystem
     from filippov.trace.branching import Tracer
 
-__all__ = ["N_POINTS", "verify", "verify_event"]
+__all__ = ["N_POINTS", "points_around", "verify", "verify_event"]
 
 # Points compared, the initial point included.
 N_POINTS = 5
@@ -75,7 +75,7 @@ def verify(
         If they differ by more than 1e-9 of the size of the field.
     """
     with np.errstate(all="ignore"):
-        points = _points(t0, y0)
+        points = points_around(t0, y0)
         if system.n_laws:
             # Off the ticks, where rounding decides.
             points = [(t + 1e-3 * (1 + abs(t)) * math.sqrt(0.1 + k), x) for k, (t, x) in enumerate(points)]
@@ -93,7 +93,7 @@ def verify_event(event: TracedEvent, g: Callable[[float, Vector], Any], tracer: 
         If they differ by more than 1e-9 of their size.
     """
     with np.errstate(all="ignore"):
-        for t, x in _points(tracer.t0, tracer.y0):
+        for t, x in points_around(tracer.t0, tracer.y0):
             traced = event.value(t, x.tolist(), tracer.values.tolist())
             own = _evaluate(g, t, x)
             if traced is None or own is None or own.size != 1 or not np.isfinite(traced + own[0]):
@@ -139,18 +139,18 @@ def _agrees_behind(
     return False
 
 
-def _points(t0: float, y0: Vector) -> list[_Point]:
-    """Return the points to compare at: the initial one, then deterministic irregular ones around it."""
-    numbers = _irregular(y0.size + 1)
+def points_around(t0: float, y0: Vector, count: int = N_POINTS) -> list[_Point]:
+    """Return times and states: the initial ones, then deterministic irregular ones around them."""
+    numbers = _irregular(y0.size + 1, count)
     states = y0 + numbers[:, :-1] * (1.0 + np.abs(y0))
     times = [t0 + 0.5 * (1.0 + number) * (1.0 + 0.1 * abs(t0)) for number in numbers[:, -1].tolist()]
     return [(t0, y0.copy()), *zip(times, states, strict=True)]
 
 
 @lru_cache(maxsize=64)
-def _irregular(size: int) -> NDArray[np.float64]:
-    """Return rows of numbers within [-1, 1] that follow no pattern, always the same."""
-    rows = np.arange(1, N_POINTS)[:, np.newaxis]
+def _irregular(size: int, count: int) -> NDArray[np.float64]:
+    """Return `count - 1` rows of numbers within [-1, 1] that follow no pattern, always the same."""
+    rows = np.arange(1, count)[:, np.newaxis]
     numbers = np.sin(12.9898 * np.arange(1, size + 1) + 78.233 * rows) * 43758.5453
     return np.asarray(2.0 * (numbers - np.floor(numbers)) - 1.0)
 
@@ -184,7 +184,8 @@ def _disagreement(
     return TraceError(
         f"{role} differs from its traced expression: {own[component]:.16g} by the function, "
         f"{traced[component]:.16g} by the expression, {where}. It uses something that tracing cannot see: a "
-        "random number, a global or a stored value that changed between the calls, or a test of the type of "
-        "its arguments; or the motion stays where it has a value of its own, as sign(x**2) has at x = 0.\n"
+        "random number, a global or a stored value that changed between the calls, a test of the type of its "
+        "arguments, or the sign of a zero, which decides between pi and -pi in np.arctan2(0 * y, x); or the "
+        "motion stays where it has a value of its own, as sign(x**2) has at x = 0.\n"
         f"What to do:\n  - compute the result from t, x and the arguments alone\n  - {BLACK_BOX}"
     )

@@ -69,6 +69,25 @@ fn odd_roots_beside_anything_switch_as_odd_powers() {
 }
 
 #[test]
+fn sums_of_odd_powers_of_one_value_switch_with_it() {
+    let mut g = Graph::new();
+    let (x, power, minus) = (g.state(0), g.constant(0.7), g.constant(-1.0));
+    let (sign, size) = (g.sign(x), g.abs(x));
+    let steep = g.pow(size, power);
+    let steep = g.mul(sign, steep);
+    let own = g.mul(x, size);
+    for sum in [g.add(x, steep), g.add(own, steep)] {
+        assert_eq!(surface(&mut g, sum), ("x[0]".into(), 1.0));
+        let opposite = g.mul(minus, sum);
+        assert_eq!(surface(&mut g, opposite), ("x[0]".into(), -1.0));
+    }
+    // A difference of them has other zeros too, and so has one from a number.
+    for other in [g.sub(x, steep), g.add(steep, power)] {
+        assert_ne!(surface(&mut g, other).0, "x[0]");
+    }
+}
+
+#[test]
 fn two_roots_switch_where_their_arguments_are_equal() {
     let mut g = Graph::new();
     let (x, y) = (g.state(0), g.state(1));

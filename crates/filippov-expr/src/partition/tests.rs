@@ -119,3 +119,32 @@ fn between_switches_a_sign_is_a_constant() {
         assert!(!g.is_affine(node));
     }
 }
+
+#[test]
+fn parameters_switch_off_what_moves() {
+    let mut g = Graph::new();
+    let (x, p, q, one) = (g.state(0), g.parameter(0), g.parameter(1), g.constant(1.0));
+    let (px, qx, square) = (g.mul(p, x), g.mul(q, x), g.mul(x, x));
+    let divisor = g.add(one, square);
+    let (quotient, inverse) = (g.div(p, divisor), g.div(one, divisor));
+    let power = g.pow(x, p);
+    let wave = g.unary(UnaryOp::Sin, px);
+    let (difference, of_one, of_quotients) =
+        (g.sub(px, qx), g.sub(x, px), g.sub(quotient, inverse));
+    for (value, parameters, exact) in [
+        (px, [0.0, 1.0], Some(0.0)),
+        (px, [2.0, 1.0], None),
+        (quotient, [0.0, 1.0], Some(0.0)),
+        (wave, [0.0, 1.0], Some(0.0)),
+        (power, [0.0, 1.0], Some(1.0)),
+        (difference, [0.5, 0.5], Some(0.0)),
+        (difference, [0.5, 0.25], None),
+        (of_one, [1.0, 0.0], Some(0.0)),
+        (of_quotients, [1.0, 0.0], Some(0.0)),
+        (of_quotients, [2.0, 0.0], None),
+        (p, [3.0, 0.0], Some(3.0)),
+        (x, [3.0, 0.0], None),
+    ] {
+        assert_eq!(g.value_at(value, &parameters), exact);
+    }
+}

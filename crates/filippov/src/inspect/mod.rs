@@ -20,7 +20,7 @@ pub use leg::{state_after, Leg, LegError};
 pub use message::message_of;
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
-pub use off_surfaces::{field_off_surfaces, OffSurfaces};
+pub use off_surfaces::{field_off_surfaces, surfaces_of_rounding, OffSurfaces};
 
 #[cfg(test)]
 mod tests;

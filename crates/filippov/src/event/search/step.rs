@@ -19,8 +19,8 @@ use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::system::is_zero_within;
 use crate::tolerances::{
-    CANCELLED, EPS, ERRORS_OF_STEPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PIECES_OF_RANGES,
-    PROOF_DEPTH, SPARE_SPREAD, TOO_LARGE_A_CHANGE,
+    CANCELLED, EPS, ERRORS_OF_STEPS, EXTRAPOLATION, HUGGING, MARGIN, ONE_SIDED_AIM,
+    PIECES_OF_RANGES, PROOF_DEPTH, ROUNDING, SPARE_SPREAD, TOO_LARGE_A_CHANGE,
 };
 use crate::vectors::largest;
 
@@ -127,7 +127,7 @@ impl StepSearch<'_, '_> {
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             return Ok(false);
         }
-        if self.drowns(sought.dt)? {
+        if self.drowns(sought.dt)? || self.spans_magnitudes()? {
             return Ok(false);
         }
         if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
@@ -180,6 +180,31 @@ impl StepSearch<'_, '_> {
             let leading = |zero: Deflation| zero.leading.abs() * dt.powi(zero.order);
             let value = m.deflation.map_or(m.value, leading);
             if m.guard.is_surface() && value < CANCELLED * self.noise_of(&m)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Is a switching function so much larger at one end of the step that its rounding there drowns what it is at the other end,
+    /// as that of `exp(-100 x)` may be?
+    fn spans_magnitudes(&mut self) -> Result<bool, FieldError> {
+        for index in 0..self.run.motion.monitored.len() {
+            let m = self.run.motion.monitored[index];
+            let Some(j) = m.surface().filter(|_| !m.affine && m.deflation.is_none()) else {
+                continue;
+            };
+            let (left, right) = (m.value.abs(), self.detector.right[index].0.abs());
+            let small = left.min(right);
+            if CANCELLED * small >= left.max(right) || small > HUGGING * self.noise_of(&m)? {
+                continue;
+            }
+            let x = match left < right {
+                true => &self.run.x,
+                false => self.stepper.end(),
+            };
+            let place = self.run.motion.setting().at(self.run.t, x);
+            if small > HUGGING * ROUNDING * self.run.system.surface_size(j, &place)? {
                 return Ok(true);
             }
         }

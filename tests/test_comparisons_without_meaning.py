@@ -1,0 +1,201 @@
+"""Comparisons that mean nothing: of what a parameter switches off, and of two quantities that are equal.
+
+With ``p = 0`` the comparison ``p * x > 0`` is False everywhere, as in Python, and there is no surface. Two
+quantities may be equal in a whole region though they are written in different ways: then the sign of their
+difference is that of rounding, and a warning says so.
+"""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from filippov.errors import FilippovWarning, TraceError
+
+
+def relay(t: float, x: Any, p: float = 1.0) -> list[Any]:
+    return [1 + np.sign(p * x[0])]
+
+
+# From x = 1/2, over one unit of time: the state with p = 0, as the function says in Python, and with p = 1.
+SWITCHED_OFF: dict[str, tuple[Callable[..., Any], float, float]] = {
+    "sign": (relay, 1.5, 2.5),
+    ">": (lambda t, x, p=1.0: [1 + np.where(p * x[0] > 0, 1.0, 0.0)], 1.5, 2.5),
+    ">=": (lambda t, x, p=1.0: [1 + np.where(p * x[0] >= 0, 1.0, 0.0)], 2.5, 2.5),
+    "<": (lambda t, x, p=1.0: [1 + np.where(p * x[0] < 0, 1.0, 0.0)], 1.5, 1.5),
+    "gains": (lambda t, x, p=1.0: [1 + np.sign(p * x[0] + 2 * p * t)], 1.5, 2.5),
+    "quotient": (lambda t, x, p=1.0: [1 + np.sign(p / x[0])], 1.5, 2.5),
+    "inside": (lambda t, x, p=1.0: [1 + np.sign(np.sinh(p * x[0]))], 1.5, 2.5),
+    "absolute value": (lambda t, x, p=1.0: [1 + np.sign(abs(p * (x[0] - 5)))], 1.5, 2.5),
+    "maximum": (lambda t, x, p=1.0: [1 + np.maximum(p * (x[0] - 5), 0.0)], 1.5, 1.5),
+    "if": (lambda t, x, p=1.0: [2.0 if p * x[0] > 0 else 1.0], 1.5, 2.5),
+    "square": (lambda t, x, p=1.0: [1 + np.where((p * x[0]) ** 2 > 0, 1.0, 0.0)], 1.5, 2.5),
+    "distance": (lambda t, x, p=1.0: [1 + np.where(np.hypot(p * x[0], p) > 0, 1.0, 0.0)], 1.5, 2.5),
+    "exponential": (lambda t, x, p=1.0: [1 + np.sign(p * np.exp(x[0]))], 1.5, 2.5),
+}
+
+
+def test_terms_of_equal_factors_cancel() -> None:
+    system = fl.System(
+        lambda t, x, p=0.5, q=1.0: [
+            1 + np.sign(q * x[0] - p * x[0]),
+            np.where(p / (1 + x[0] ** 2) > 1 / (1 + x[0] ** 2), 1.0, 0.0),
+        ],
+        n=2,
+    )
+    for p, exact in ((0.5, [2.5, 0.0]), (1.0, [1.5, 0.0]), (1.5, [0.5, 1.0]), (1.0, [1.5, 0.0])):
+        sol = system.solve((0, 1), [0.5, 0.0], p=p)
+        assert not sol.warnings
+        assert sol.y[:, -1] == pytest.approx(exact, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SWITCHED_OFF)
+def test_a_comparison_that_a_parameter_switches_off_is_that_of_zero(name: str) -> None:
+    function, off, on = SWITCHED_OFF[name]
+    system = fl.System(function, n=1)
+    # In whatever order: the trace for one value does not hold for the other one.
+    for p, exact in ((1.0, on), (0.0, off), (2.0, None), (0.0, off), (1.0, on)):
+        sol = system.solve((0, 1), [0.5], p=p)
+        assert sol.success
+        assert not sol.warnings
+        if exact is not None:
+            assert sol.y[0, -1] == pytest.approx(exact, abs=1e-9)
+    again = fl.solve_ivp(function, (0, 1), [0.5], args=(0.0,))
+    assert again.y[0, -1] == pytest.approx(off, abs=1e-9)
+
+
+@pytest.mark.parametrize("values", [[0.0, 1.0, 2.0], [1.0, 0.0, 2.0], [1.0, 2.0, 0.0], [0.0, 0.0], [0.0]])
+def test_ensembles_and_sweeps_pass_a_parameter_of_zero(values: list[float]) -> None:
+    system = fl.System(relay, n=1)
+    exact = [1.5 if p == 0.0 else 2.5 for p in values]
+    members = system.ensemble((0, 1), [0.5], params={"p": values})
+    assert [member.y[0, -1] for member in members] == pytest.approx(exact, abs=1e-9)
+    found = fl.sweep(system, (0, 1), y0=[0.5], params={"p": values})
+    assert found["x[0]"].values == pytest.approx(exact, abs=1e-9)
+    assert (found["status"].values == 0).all()
+
+
+def test_a_sweep_with_returns_names_the_point_that_has_other_surfaces() -> None:
+    system = fl.System(lambda t, x, p=1.0: [-x[0] + np.sign(p * np.sin(t))], n=1)
+    found = fl.sweep(
+        system, (0, 40), y0=[0.5], params={"p": [0.0, 1.0, 2.0]}, section=fl.Phase(2 * np.pi), n=2
+    )
+    assert found["status"].values.tolist() == [-1, 1, 1]
+    assert "other surfaces" in str(found["message"].values[0])
+
+
+def test_a_scaling_does_not_fit_where_a_surface_is_switched_off() -> None:
+    scaled = fl.SlidingPolicy(kappa=[2.0])
+    found = fl.sweep(fl.System(relay, n=1), (0, 1), y0=[0.5], params={"p": [1.0, 0.0]}, sliding=scaled)
+    assert found["status"].values.tolist() == [0, -1]
+    assert "kappa" in str(found["message"].values[1])
+
+
+def test_exponents_pass_a_parameter_of_zero() -> None:
+    system = fl.System(lambda t, x, p=1.0: [-x[0] + np.sign(p * np.sin(t))], n=1)
+    found = fl.lyapunov(system, (0, 20), y0=[0.5], params={"p": [0.0, 1.0]})
+    assert found["exponent"].values.ravel() == pytest.approx([-1.0, -1.0], abs=1e-6)
+
+
+def test_derivatives_where_a_comparison_is_switched_off() -> None:
+    # x' = F x + sign(p x): with p = 0 the exact state is exp(F), and its derivative by F is exp(F).
+    system = fl.System(lambda t, x, p=1.0, F=0.5: [F * x[0] + np.sign(p * x[0])], n=1)
+    with pytest.warns(FilippovWarning, match=r"one_sided: .*x\[0\]\*p = 0"):
+        sol = system.solve((0, 1), [1.0], p=0.0, wrt=["F", "p"])
+    assert sol.derivative()[0] == pytest.approx([np.exp(0.5), 0.0], abs=1e-8)
+
+
+def test_a_copy_without_its_function_says_for_what_it_holds() -> None:
+    system = fl.System(relay, n=1)
+    system.solve((0, 1), [0.5], p=1.0)
+    copy = pickle.loads(pickle.dumps(system))
+    assert copy.solve((0, 1), [0.5], p=3.0).y[0, -1] == pytest.approx(2.5)
+    with pytest.raises(fl.ModelError, match="switch off a comparison of the function"):
+        copy.solve((0, 1), [0.5], p=0.0)
+
+
+def test_the_angle_of_a_point_on_the_axis() -> None:
+    # arctan2(p*y, x) with p = 0 is 0 where x > 0 and pi where x < 0, as long as p*y is no negative zero.
+    system = fl.System(lambda t, x, p=1.0: [np.arctan2(p * np.exp(x[1]), x[0]) - 2.0, 0.0, 1.0], n=3)
+    sol = system.solve((0, 1), [1.0, 0.0, 0.0], p=0.0)
+    # x falls with rate 2 to 0 at t = 1/2. Behind it the rate would be pi - 2: it slides there.
+    assert sol.success
+    assert sol.y[0, -1] == pytest.approx(0.0, abs=1e-12)
+    assert sol.switches[0].t == pytest.approx(0.5, abs=1e-10)
+    signed = fl.System(lambda t, x, p=1.0: [np.arctan2(p * x[0], x[1]), 0.0], n=2)
+    with pytest.raises(TraceError, match="the sign of a zero"):
+        signed.solve((0, 1), [-1.0, -1.0], p=0.0)
+
+
+def test_an_arctangent_whose_numerator_is_switched_off() -> None:
+    system = fl.System(lambda t, x, b=1.0: [-x[1], x[0], np.arctan(b * x[1] / x[0])], n=3)
+    for method in ("auto", "DOP853"):
+        sol = system.solve((0, 5), [1.0, 0.1, 0.0], b=0.0, method=method)
+        assert sol.success
+        assert not sol.warnings
+        assert sol.y[2, -1] == 0.0
+
+
+IDENTITIES: dict[str, Callable[[Any, Any], Any]] = {
+    "angle of a wave": lambda x, y: np.arccos(np.cos(x)) < x,
+    "its sine": lambda x, y: np.arcsin(np.sin(x)) < x,
+    "its point": lambda x, y: np.arctan2(np.sin(x), np.cos(x)) < x,
+    "square": lambda x, y: (x + 1) ** 2 < x * x + 2 * x + 1,
+    "cubes": lambda x, y: (x - y) * (x * x + x * y + y * y) < x**3 - y**3,
+    "circle": lambda x, y: np.hypot(np.sin(x), np.cos(x)) < 1,
+    "squares": lambda x, y: np.sin(x) ** 2 + np.cos(x) ** 2 < 1,
+    "hyperbola": lambda x, y: np.cosh(x) ** 2 - np.sinh(x) ** 2 < 1,
+    "logarithm": lambda x, y: np.exp(np.log(x)) < x,
+    "root": lambda x, y: np.sqrt(x) ** 2 < x,
+    "power": lambda x, y: x**1.5 < x * np.sqrt(x),
+}
+
+
+@pytest.mark.parametrize("start", [0.3, 0.7, 1.1])
+@pytest.mark.parametrize("name", IDENTITIES)
+def test_equal_quantities_are_doubted(name: str, start: float) -> None:
+    is_less = IDENTITIES[name]
+
+    def field(t: float, x: Any) -> list[Any]:
+        return [1.0, 0.3, np.where(is_less(x[0], x[1]), 1.0, 0.0)]
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fl.solve_ivp(field, (0, 0.1), [start, 0.4, 0.0])
+    texts = [str(warning.message) for warning in caught]
+    doubts = [text for text in texts if "up to rounding" in text]
+    assert len(doubts) == 1
+    assert "its sign means nothing there" in doubts[0]
+    assert "is_less(x[0], x[1])" in doubts[0] or "IDENTITIES" not in doubts[0]
+
+
+SENSIBLE: dict[str, tuple[Callable[..., Any], list[float]]] = {
+    "saturation": (lambda t, x: [np.where(np.tanh(50 * x[0]) > 0.999, -1.0, 1.0), 0.0], [0.3, 0.0]),
+    "plateau": (lambda t, x: [np.where(np.maximum(x[0] - 1, 0.0) > 0, -1.0, 1.0), 0.0], [0.3, 0.0]),
+    "dead zone": (lambda t, x: [-np.sign(np.maximum(abs(x[0]) - 5, 0.0)), 0.0], [0.3, 0.0]),
+    "Stribeck": (
+        lambda t, x: [x[1], -x[0] - np.sign(x[1] - 1) * (0.3 + 0.2 * np.exp(-((x[1] - 1) ** 2)))],
+        [0.3, 0.0],
+    ),
+    "start on a curve": (lambda t, x: [-np.sign(x[0] ** 2 + x[1] ** 2 - 1), 1.0], [0.6, 0.8]),
+    "rest on a parabola": (lambda t, x: [1.0, 2 * x[0] - np.sign(x[1] - x[0] ** 2)], [0.0, 0.0]),
+    "nanometres": (lambda t, x: [1e-9, -1e-9 * np.sign(x[1] * x[0] - 2e-18)], [1e-9, 1e-9]),
+    "Hill function": (
+        lambda t, x: [1 - x[0], np.where(x[0] ** 40 / (0.5**40 + x[0] ** 40) > 0.5, 1.0, 0.0) - x[1]],
+        [0.1, 0.0],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SENSIBLE)
+def test_other_quantities_are_not_doubted(name: str) -> None:
+    field, start = SENSIBLE[name]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fl.solve_ivp(field, (0, 1), start)
+    assert not [w for w in caught if "up to rounding" in str(w.message)]
