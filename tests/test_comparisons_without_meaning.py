@@ -199,3 +199,55 @@ def test_other_quantities_are_not_doubted(name: str) -> None:
         warnings.simplefilter("always")
         fl.solve_ivp(field, (0, 1), start)
     assert not [w for w in caught if "up to rounding" in str(w.message)]
+
+
+def test_a_relay_whose_thresholds_meet_is_refused() -> None:
+    system = fl.System(lambda t, x, p=0.1: [-x[0] - fl.hysteresis(x[0], -p, p)], n=1)
+    assert system.solve((0, 1), [1.0]).success
+    for p in (0.0, -0.05):
+        with pytest.raises(fl.ModelError, match="low must be below high"):
+            system.solve((0, 1), [1.0], p=p)
+    assert system.solve((0, 1), [1.0], p=0.2).success
+
+
+@pytest.mark.parametrize("values", [[0.7, 0.0], [0.0, 0.7]])
+def test_events_of_an_ensemble_are_those_of_each_member(values: list[float]) -> None:
+    system = fl.System(lambda t, x, p=1.0: [x[1], -x[0]], n=2)
+    members = system.ensemble(
+        (0, 7),
+        [1.0, 0.0],
+        params={"p": values},
+        events=lambda t, x, p: np.where(p * x[1] > 0, x[0], x[0] - 0.3),
+    )
+    for p, member in zip(values, members, strict=True):
+        alone = system.solve(
+            (0, 7), [1.0, 0.0], p=p, events=lambda t, x, p: np.where(p * x[1] > 0, x[0], x[0] - 0.3)
+        )
+        assert member.t_events[0] == pytest.approx(alone.t_events[0], abs=1e-9)
+    # cos(t) = 0.3 all the time with p = 0.
+    off = members[values.index(0.0)]
+    angle = np.arccos(0.3)
+    assert off.t_events[0] == pytest.approx([angle, 2 * np.pi - angle], abs=1e-9)
+
+
+@pytest.mark.parametrize("values", [[0.7, 0.0], [0.0, 0.7]])
+def test_sections_of_a_sweep_are_those_of_each_point(values: list[float]) -> None:
+    system = fl.System(lambda t, x, p=1.0: [x[1], -x[0]], n=2)
+    found = fl.sweep(
+        system,
+        (0, 7),
+        y0=[1.0, 0.0],
+        params={"p": values},
+        section=lambda t, x, p: np.where(p * x[1] > 0, x[0], x[0] - 0.3),
+    )
+    ends = np.cumsum(found["row_size"].values)
+    first = values.index(0.0)
+    angle = np.arccos(0.3)
+    off = found["t"].values[ends[first] - found["row_size"].values[first] : ends[first]]
+    assert off == pytest.approx([angle, 2 * np.pi - angle], abs=1e-9)
+
+
+def test_equilibria_where_a_comparison_is_that_of_a_parameter() -> None:
+    system = fl.System(lambda t, x, p=0.5: [x[1], -x[0] - 0.2 * (p * np.exp(x[1]) > 0) - 0.3 * x[1]], n=2)
+    (found,) = fl.equilibria(system, [(-2.0, 2.0), (-2.0, 2.0)])
+    assert found.y == pytest.approx([-0.2, 0.0], abs=1e-12)

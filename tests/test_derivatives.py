@@ -9,6 +9,7 @@ import json
 import math
 import pickle
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import filippov as fl
@@ -665,3 +666,38 @@ def test_at_a_level_that_nothing_leaves(end: float) -> None:
         np.testing.assert_allclose(column, (above - below) / (2 * d), atol=1e-7)
     # The start is forgotten.
     assert np.all(np.abs(sol.derivative()[0, :2]) < 1e-15)
+
+
+JUMPING: dict[str, Callable[[float, Any, float], Any]] = {
+    "sign": lambda t, x, p: np.sign(x[1]) - p,
+    "where": lambda t, x, p: np.where(x[1] > 0, 1.0, -1.0) - p,
+    "angle of a sign": lambda t, x, p: np.arccos(0.5 * np.sign(x[1])) - 1.5 - p,
+    "with another sign": lambda t, x, p: np.sign(x[1]) * (2 + np.sign(x[0] - 9.0)) - p,
+}
+
+
+@pytest.mark.parametrize("name", JUMPING)
+def test_a_zero_at_a_jump_moves_with_the_jump(name: str) -> None:
+    # From (x0, v0) the velocity of x'' = -x vanishes at arctan(v0/x0), whatever p is.
+    system = fl.System(lambda t, x, p=0.1: [x[1], -x[0]], n=2)
+    event = fl.Event(JUMPING[name], terminal=True)
+    x0, v0 = 1.7, 0.3
+    size = x0**2 + v0**2
+    exact = [-v0 / size, x0 / size, 0.0]
+    sol = system.solve((0, 3), [x0, v0], events=event, wrt=["y0", "p"])
+    assert sol.t[-1] == pytest.approx(np.arctan(v0 / x0), abs=1e-9)
+    np.testing.assert_allclose(sol.dt_events[0], [exact], rtol=0, atol=1e-9)
+    _, found = fl.gradient(
+        system, (0, 3), [x0, v0], {"p": 0.1}, terminal=lambda t, y: t, events=event, wrt=["y0", "p"]
+    )
+    np.testing.assert_allclose([found["x[0]"], found["x[1]"], found["p"]], exact, rtol=0, atol=1e-9)
+
+
+def test_a_zero_at_the_cut_of_an_angle_moves_with_the_cut() -> None:
+    system = fl.System(lambda t, x, p=0.1: [x[1], -x[0]], n=2)
+    cut = fl.Event(lambda t, x, p: np.arctan2(x[1] - 0.1 * p, x[0]) - p, terminal=True)
+    # It jumps through zero where v = p/10 and x < 0: dv/dt = -x there.
+    sol = system.solve((0, 6), [1.7, 0.3], p=0.37, events=cut, wrt=["p"])
+    x = sol.y[0, -1]
+    assert x < 0
+    np.testing.assert_allclose(sol.dt_events[0], [[0.1 / -x]], rtol=1e-7)

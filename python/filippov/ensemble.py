@@ -345,8 +345,8 @@ def _groups(
 ) -> list[_Group]:
     """Return the members in groups, usually one.
 
-    A function that branches on parameter values, or cannot be traced, is prepared for every combination of
-    values anew, one of which a value switches a comparison off for that value; and an event that cannot be
+    A function that branches on parameter values, or cannot be traced, is prepared anew for every combination
+    of values. Others are prepared anew for values that switch a comparison off. An event that cannot be
     traced is called with the values of its members.
     """
     count = len(states)

@@ -117,6 +117,14 @@ def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
     if isinstance(value, Scalar):
         tracer = value.tracer
         bounds = (tracer.node(low), tracer.node(high))
+        width = tracer.builder.binary("subtract", bounds[1], bounds[0])
+        known = tracer.known_value(width)
+        if known is not None:
+            tracer.positive[width] = None
+            if known <= 0.0:
+                raise InputError(
+                    f"low, high: low must be below high; with these parameters high - low is {known:g}"
+                )
         return tracer.scalar(tracer.laws.hysteresis(tracer, value.node, *bounds, float(initial)))
     if why := _refused.get():
         raise ModelError(why)

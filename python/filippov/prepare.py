@@ -123,8 +123,8 @@ class Prepared(NamedTuple):
     def n_valid(self, table: Array) -> int:
         """Return for how many of the first rows of parameter values, (k, p), this form holds.
 
-        If it holds for some values only, these are taken to be the first row. If it holds for others too, it
-        ends at a row that switches a comparison off, as p = 0 does that of ``p * x`` with 0.
+        If it holds for one set of values only, these are the first row. Otherwise it holds for all rows up to
+        one that switches a comparison off, as p = 0 does in ``p * x > 0``.
         """
         if self.pinned is not None:
             return n_alike(table)
@@ -137,8 +137,13 @@ class Prepared(NamedTuple):
 
 def n_alike(table: Array) -> int:
     """Return how many of the first rows are the same."""
-    differs = (table != table[0]).any(axis=1)
-    return int(differs.argmax()) if differs.any() else len(table)
+    stop = 1
+    while stop < len(table):
+        differs = (table[stop : 2 * stop] != table[0]).any(axis=1)
+        if differs.any():
+            return stop + int(differs.argmax())
+        stop *= 2
+    return len(table)
 
 
 def prepare(

@@ -36,10 +36,11 @@ impl Builder {
     }
 }
 
-/// How many of the first rows of parameters leave none of these nodes a number.
+/// How many of the first rows of parameters leave none of these nodes a number, and none of the others one that is not
+/// positive.
 pub fn n_rows_without_number(
     graph: &Graph,
-    nodes: &[NodeId],
+    (nodes, positive): (&[NodeId], &[NodeId]),
     table: &PyReadonlyArray2<'_, f64>,
 ) -> PyResult<usize> {
     let (count, width) = (table.shape()[0], table.shape()[1]);
@@ -47,11 +48,12 @@ pub fn n_rows_without_number(
         return Ok(count);
     }
     let mut rows = table.as_slice()?.chunks(width);
-    let is_number = |row: &[f64]| {
+    let is_other = |row: &[f64]| {
         let mut values = nodes.iter().map(|&node| graph.value_at(node, row));
-        values.any(|value| value.is_some())
+        let mut least = positive.iter().map(|&node| graph.value_at(node, row));
+        values.any(|value| value.is_some()) || least.any(|v| v.is_some_and(|v| v <= 0.0))
     };
-    Ok(rows.position(is_number).unwrap_or(count))
+    Ok(rows.position(is_other).unwrap_or(count))
 }
 
 #[pymethods]
@@ -211,12 +213,14 @@ impl Builder {
     fn n_rows_without_number(
         &self,
         nodes: Vec<u32>,
+        positive: Vec<u32>,
         table: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<usize> {
         let graph = self.graph();
-        let nodes = nodes.into_iter().map(|id| Self::node(&graph, id));
-        let nodes = nodes.collect::<PyResult<Vec<_>>>()?;
-        n_rows_without_number(&graph, &nodes, &table)
+        let known = |ids: Vec<u32>| ids.into_iter().map(|id| Self::node(&graph, id)).collect();
+        let nodes: PyResult<Vec<NodeId>> = known(nodes);
+        let positive: PyResult<Vec<NodeId>> = known(positive);
+        n_rows_without_number(&graph, (&nodes?, &positive?), &table)
     }
 
     fn depends_on_state(&self, a: u32) -> PyResult<bool> {

@@ -376,7 +376,7 @@ impl TracedEvent {
     /// For how many of the first rows of parameters it holds; for the first it does.
     fn n_valid(&self, table: PyReadonlyArray2<'_, f64>) -> PyResult<usize> {
         if !self.is_pinned {
-            return n_rows_without_number(&self.graph, &self.moving, &table);
+            return n_rows_without_number(&self.graph, (&self.moving, &[]), &table);
         }
         let rows = table.as_array();
         let differs = |row: &_| *row != rows.row(0);

@@ -510,7 +510,7 @@ impl TracedSystem {
         let graph = self.system.graph();
         let surfaces = (0..self.n_visible()).map(|j| graph.surface(j as u32));
         let moving: Vec<_> = surfaces.filter(|&h| graph.depends_on_motion(h)).collect();
-        n_rows_without_number(graph, &moving, &table)
+        n_rows_without_number(graph, (&moving, &[]), &table)
     }
 
     /// Whether the field may jump at a surface in a mode; if not, the field has a kink there, or is smooth.

@@ -393,7 +393,8 @@ def _function_place(
     if traced.tracer.laws.names:
         warn_user([sampled(f"section ({function_name(g, 'function')})", OWN_LAW)])
         return called
-    if traced.guards:
+    if traced.guards or traced.moving:
+        # For other values of the parameters it may have another form.
         return called
     return Place("function", direction, function=traced.system)
 

@@ -263,7 +263,10 @@ def _modes(search: _Search) -> Iterator[tuple[int, ...]]:
     if regions is None:
         yield from itertools.islice(itertools.product((-1, 1), repeat=n_surfaces), _MOST_MODES + 1)
         return
-    signs = np.array(regions, dtype=np.int64).reshape(len(regions), n_surfaces)
+    signs = np.array(regions, dtype=np.int64).reshape(len(regions), -1)
+    if signs.shape[1] > n_surfaces:
+        # Behind the surfaces are those that no motion crosses, as that of a parameter.
+        signs = np.unique(signs[:, :n_surfaces], axis=0)
     jumps = [j for j in range(n_surfaces) if core.switches_at(j)]
     count = 0
     for m in range(min(search.n, len(jumps)) + 1):

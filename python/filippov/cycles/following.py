@@ -868,7 +868,9 @@ class _Side:
             else:
                 assert isinstance(curve, EquilibriumCurve)
                 motions, place = curve.motions, key[1]
-            surface = motions.prepared.surfaces[place] if place >= 0 else ""
+            surfaces = motions.prepared.surfaces
+            # Behind the surfaces are the levels of quantisers and the thresholds of relays.
+            surface = surfaces[place] if 0 <= place < len(surfaces) else ""
         kind = f"{key[1]} vanishes" if code == "UZ" else CODES[code]
         params = {name: state.params[name]}
         tangent = tuple(secant.tolist()) if code == "BP" and secant is not None else ()

@@ -182,8 +182,9 @@ class Tracer:
         self._continued: dict[int, int] = {}
         self.ends_of_roots: list[int] = []
         self._roots: dict[int, tuple[int, Callable[[int], int] | None]] = {}
-        # Numerators of the quotients inside of arcs.
+        # Numerators of the quotients inside of arcs; widths of relays that parameters decide.
         self._divided: dict[int, None] = {}
+        self.positive: dict[int, None] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -495,7 +496,9 @@ class Tracer:
         y, x = legs
         self._divided[y] = None
         if op == "arctan" and self.known_value(y) == 0.0:
-            return builder.constant(self.known_sign(y) or 0.0)
+            # So it is for these values of the parameters, of which the sign makes a note.
+            self.known_sign(y)
+            return builder.constant(0.0)
         opposite = builder.unary("negative", y) if op == "arctan" else y
         behind = builder.binary("arctan2", opposite, builder.unary("negative", x))
         angle = self.choose(x, builder.binary("arctan2", y, x), behind)

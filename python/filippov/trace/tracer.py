@@ -77,6 +77,8 @@ class Trace:
         How such roots go on, as in a `Source`.
     moving : tuple of int
         What the functions asked about that other values of the parameters may make a number.
+    positive : tuple of int
+        What has to be positive: widths of relays, of constants and parameters.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
     """
@@ -96,11 +98,12 @@ class Trace:
     ends: tuple[tuple[int, float], ...] = ()
     root_ends: str = ""
     moving: tuple[int, ...] = ()
+    positive: tuple[int, ...] = ()
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def n_rows_without_number(self, table: NDArray[np.float64]) -> int:
-        """Return how many of the first rows of parameters switch no comparison off, as ``p * x > 0``."""
-        return self.builder.n_rows_without_number(list(self.moving), table)
+        """Return how many of the first rows of parameters switch nothing off, as 0 does ``p * x > 0``."""
+        return self.builder.n_rows_without_number(list(self.moving), list(self.positive), table)
 
     @property
     def borders(self) -> tuple[str, ...]:
@@ -251,6 +254,7 @@ def trace(
         ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
         root_ends=root_ends,
         moving=tuple(tracer.moving()),
+        positive=tuple(tracer.positive),
     )
 
 

@@ -8,6 +8,7 @@ use crate::error::{Error, FieldError};
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
+use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
 
 /// A run with its derivatives.
@@ -78,7 +79,7 @@ impl<'r> Differentiated<'r> {
         path(t, &mut x)?;
         let z = extended.state(&x);
         let field = piece.rates(t, &z)?;
-        let (time, gradient) = function.at(t, &z, &piece.q)?;
+        let (time, gradient) = function.at_zero(t, &z, &piece.q)?;
         let rate = time + dot(&gradient, &field);
         let shift = |column: &Vec<f64>| -dot(&gradient, column) / rate;
         Ok(Some(columns.iter().map(shift).collect()))
@@ -258,5 +259,43 @@ impl EventGradient {
             gradient[column] = -value;
         }
         Ok((slopes.time()[0], gradient))
+    }
+
+    /// The same for what fixes the time of a zero at a point: the function itself, or, if it jumps through zero, the function
+    /// inside of it at whose zero it jumps.
+    pub(super) fn at_zero(
+        &self,
+        t: f64,
+        z: &[f64],
+        q: &[f64],
+    ) -> Result<(f64, Vec<f64>), FieldError> {
+        let system = &self.extended;
+        let signs = sides_of(system, (t, z), q)?;
+        let here = Setting::new(&signs, q).at(t, z);
+        let mut h = vec![0.0; system.n_surfaces()];
+        system.surfaces(&here, &mut h)?;
+        let mut value = vec![0.0; z.len()];
+        let mut jump: Option<usize> = None;
+        for j in 0..h.len() {
+            let mut sides = [0.0; 2];
+            for (side, found) in [-1.0, 1.0].into_iter().zip(&mut sides) {
+                let mut signs = signs.clone();
+                signs[j] = side;
+                system.field(&Setting::new(&signs, q).at(t, z), &mut value)?;
+                *found = value[0];
+            }
+            let [least, most] = [f64::min, f64::max].map(|f| f(sides[0].abs(), sides[1].abs()));
+            let jumps = sides[0] * sides[1] < 0.0 && least > AT_SIDE * most;
+            // Of several the one that vanishes.
+            if jumps && jump.is_none_or(|known| h[j].abs() < h[known].abs()) {
+                jump = Some(j);
+            }
+        }
+        if let Some(j) = jump {
+            let mut gradient = vec![0.0; z.len()];
+            let time = system.gradient(j, &here, &mut gradient)?;
+            return Ok((time, gradient));
+        }
+        self.at(t, z, q)
     }
 }
