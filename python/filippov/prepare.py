@@ -116,9 +116,11 @@ class Prepared(NamedTuple):
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
-        if self.core.n_states != n or (self.pinned is not None and self.pinned != values):
+        if self.core.n_states != n:
             return False
-        return self.pinned is not None or self.n_valid(parameter_vector(values)[np.newaxis]) > 0
+        if self.pinned is not None:
+            return self.pinned == values
+        return self._holds_for_all() or self.n_valid(parameter_vector(values)[np.newaxis]) > 0
 
     def n_valid(self, table: Array) -> int:
         """Return for how many of the first rows of parameter values, (k, p), this form holds.
@@ -128,11 +130,13 @@ class Prepared(NamedTuple):
         """
         if self.pinned is not None:
             return n_alike(table)
-        if not isinstance(self.core, TracedSystem):
+        if not isinstance(self.core, TracedSystem) or self._holds_for_all():
             return len(table)
         table = np.ascontiguousarray(table)
-        own = self.core.n_rows_without_number(table)
-        return own if self.trace is None else min(own, self.trace.n_rows_without_number(table))
+        return (self.trace or self.core).n_rows_without_number(table)
+
+    def _holds_for_all(self) -> bool:
+        return self.trace is not None and self.trace.holds_for_all()
 
 
 def n_alike(table: Array) -> int:

@@ -313,6 +313,14 @@ impl Builder {
         self.graph().put_standing_surfaces_last(&kept)
     }
 
+    /// The switching functions, in the order of the surfaces.
+    fn surface_functions(&self) -> Vec<u32> {
+        let graph = self.graph();
+        (0..graph.n_surfaces())
+            .map(|j| graph.surface(j as u32).0)
+            .collect()
+    }
+
     fn n_surfaces(&self) -> usize {
         self.graph().n_surfaces()
     }

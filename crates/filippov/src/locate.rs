@@ -110,8 +110,8 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         let resolved = width.max(EPS * hi.abs());
         let mut converges = inside && step <= 0.5 * last_move;
         if inside && step * doubt <= 0.5 * resolved {
+            // The slope may be that of values so much larger that it tells nothing of this one: is the sign another one behind it?
             let is_zero = value.abs() >= EPS * g_lo.max(-g_hi) || {
-                // The slope is that of values so much larger that it tells nothing of this one.
                 let ahead = secant + value.signum() * resolved;
                 let beyond = g(ahead.clamp(lo, hi))?;
                 (beyond > 0.0) != (value > 0.0)

@@ -597,7 +597,8 @@ class Tracer:
 
     def moving(self) -> list[int]:
         """Return what the function asked about that other values of the parameters may make a number."""
-        nodes = dict.fromkeys([question.node for question in self.questions] + list(self._divided))
+        asked = [question.node for question in self.questions]
+        nodes = dict.fromkeys([*asked, *self._divided, *self.builder.surface_functions()])
         values = self.values.tolist()
         return [
             node

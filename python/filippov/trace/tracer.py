@@ -75,9 +75,9 @@ class Trace:
         For each end of a root that is a surface its index, and the sign of the side where the root is.
     root_ends : str
         How such roots go on, as in a `Source`.
-    moving : tuple of int
+    moving : list of int
         What the functions asked about that other values of the parameters may make a number.
-    positive : tuple of int
+    positive : list of int
         What has to be positive: widths of relays, of constants and parameters.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
@@ -97,13 +97,17 @@ class Trace:
     has_roots: bool = False
     ends: tuple[tuple[int, float], ...] = ()
     root_ends: str = ""
-    moving: tuple[int, ...] = ()
-    positive: tuple[int, ...] = ()
+    moving: list[int] = member(default_factory=list)
+    positive: list[int] = member(default_factory=list)
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def n_rows_without_number(self, table: NDArray[np.float64]) -> int:
         """Return how many of the first rows of parameters switch nothing off, as 0 does ``p * x > 0``."""
-        return self.builder.n_rows_without_number(list(self.moving), list(self.positive), table)
+        return self.builder.n_rows_without_number(self.moving, self.positive, table)
+
+    def holds_for_all(self) -> bool:
+        """Whether no values of the parameters switch anything off."""
+        return not self.moving and not self.positive
 
     @property
     def borders(self) -> tuple[str, ...]:
@@ -253,8 +257,8 @@ def trace(
         has_roots=tracer.has_roots(field),
         ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
         root_ends=root_ends,
-        moving=tuple(tracer.moving()),
-        positive=tuple(tracer.positive),
+        moving=tracer.moving(),
+        positive=list(tracer.positive),
     )
 
 

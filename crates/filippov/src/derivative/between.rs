@@ -261,8 +261,8 @@ impl EventGradient {
         Ok((slopes.time()[0], gradient))
     }
 
-    /// The same for what fixes the time of a zero at a point: the function itself, or, if it jumps through zero, the function
-    /// inside of it at whose zero it jumps.
+    /// The same of what fixes the time of a zero at a point. That is the function itself, or, if it jumps through zero, the
+    /// function inside of it that vanishes there.
     pub(super) fn at_zero(
         &self,
         t: f64,

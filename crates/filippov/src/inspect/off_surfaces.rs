@@ -59,7 +59,8 @@ pub fn field_off_surfaces(
     Ok(Some(OffSurfaces { signs, field: here }))
 }
 
-/// The first `n_seen` switching functions that are nothing but rounding at (t, x). Affine ones are not looked at. `complete` is as in [`field_off_surfaces`].
+/// The first `n_seen` switching functions that are nothing but rounding at (t, x). Affine ones are not looked at. `complete` is
+/// as in [`field_off_surfaces`].
 ///
 /// # Errors
 /// That of a function of the user.
@@ -105,11 +106,8 @@ fn signs_at(
         system.surfaces(&Setting::new(&complete(&signs)?, q).at(t, x), &mut h)?;
         let seen = &h[..n_seen];
         // NaN beyond the domain of an inactive surface: either sign will do.
-        if seen
-            .iter()
-            .zip(&signs)
-            .all(|(h, sign)| h * sign >= 0.0 || h.is_nan())
-        {
+        let fit = |(h, sign): (&f64, &f64)| h * sign >= 0.0 || h.is_nan();
+        if seen.iter().zip(&signs).all(fit) {
             h.truncate(n_seen);
             return Ok(Some(Sides { signs, values: h }));
         }

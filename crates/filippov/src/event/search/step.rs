@@ -127,7 +127,7 @@ impl StepSearch<'_, '_> {
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             return Ok(false);
         }
-        if self.drowns(sought.dt)? || self.spans_magnitudes()? {
+        if self.drowns(sought.dt)? || self.spans_magnitudes(sought.dt)? {
             return Ok(false);
         }
         if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
@@ -188,7 +188,10 @@ impl StepSearch<'_, '_> {
 
     /// Is a switching function so much larger at one end of the step that its rounding there drowns what it is at the other end,
     /// as that of `exp(-100 x)` may be?
-    fn spans_magnitudes(&mut self) -> Result<bool, FieldError> {
+    fn spans_magnitudes(&mut self, dt: f64) -> Result<bool, FieldError> {
+        if dt <= HUGGING * EPS * self.run.t.abs() {
+            return Ok(false);
+        }
         for index in 0..self.run.motion.monitored.len() {
             let m = self.run.motion.monitored[index];
             let Some(j) = m.surface().filter(|_| !m.affine && m.deflation.is_none()) else {

@@ -397,6 +397,7 @@ impl StepSearch<'_, '_> {
         };
         // Rounding of a function whose terms are not known: that of its values.
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        // Beside values that are larger by more than rounding a value says nothing: the piece has to be shorter.
         let is_lost = |v: f64| v != 0.0 && v.abs() <= ROUNDING * largest;
         if (is_lost(values[0]) || is_lost(values[4])) && to - from > 4.0 * beside {
             return Ok(Outcome::NotFinite { everywhere: false });
