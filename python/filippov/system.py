@@ -558,8 +558,8 @@ class System(Points, Saving):
             return known
         if self._source is None:
             raise ModelError(
-                "the function has another form for these values of the parameters, and it "
-                f"did not travel with the system; this copy is valid for {known and known.pinned} only"
+                "the function branches on parameter values, and it did not travel with the system; "
+                f"this copy is valid for {known.pinned if known else {}} only"
                 if known is None or known.pinned
                 else "these values of the parameters switch off a comparison of the function, which "
                 "did not travel with the system"

@@ -16,6 +16,7 @@ use crate::event::tube::Tube;
 use crate::event::{Event, Found};
 use crate::motion::{AffineBounds, Deflation, Guard, KnownMultipliers, ModeField, Monitored};
 use crate::options::SlidingRule;
+use crate::page::IS_PAGE;
 use crate::stepper::Interpolant;
 use crate::system::is_zero_within;
 use crate::tolerances::{
@@ -189,7 +190,7 @@ impl StepSearch<'_, '_> {
     /// Is a switching function so much larger at one end of the step that its rounding there drowns what it is at the other end,
     /// as that of `exp(-100 x)` may be?
     fn spans_magnitudes(&mut self, dt: f64) -> Result<bool, FieldError> {
-        if dt <= HUGGING * EPS * self.run.t.abs() {
+        if IS_PAGE || dt <= HUGGING * EPS * self.run.t.abs() {
             return Ok(false);
         }
         for index in 0..self.run.motion.monitored.len() {

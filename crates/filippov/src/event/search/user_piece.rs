@@ -390,18 +390,25 @@ impl StepSearch<'_, '_> {
         }
         let margin = &self.detector.margin;
         let mut bounds = |a: f64, b: f64| along.bound(interpolant, margin, &q, (a, b), sign);
+        // Rounding of a function whose terms are not known: that of its values.
+        let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        // It says nothing of a value that is known better: the piece has to be shorter.
+        let is_lost = |at: f64, value: f64| {
+            let is_small = value != 0.0 && value.abs() <= ROUNDING * largest;
+            let known = is_small.then(|| bounds(at, at)).flatten();
+            known.is_some_and(|bound| value.abs() > bound.value.hi - bound.value.lo)
+        };
+        if !divided
+            && to - from > 4.0 * beside
+            && (is_lost(from, values[0]) || is_lost(to, values[4]))
+        {
+            return Ok(Outcome::NotFinite { everywhere: false });
+        }
         let evidence = Evidence::Bounds {
             bounds: &mut bounds,
             divided: i32::from(divided),
             patience: BOUNDS_DEPTH_BESIDE_ROOT,
         };
-        // Rounding of a function whose terms are not known: that of its values.
-        let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        // Beside values that are larger by more than rounding a value says nothing: the piece has to be shorter.
-        let is_lost = |v: f64| v != 0.0 && v.abs() <= ROUNDING * largest;
-        if (is_lost(values[0]) || is_lost(values[4])) && to - from > 4.0 * beside {
-            return Ok(Outcome::NotFinite { everywhere: false });
-        }
         let noise = (ROUNDING * largest).max(match divided {
             true => 0.0,
             false => rounding,
