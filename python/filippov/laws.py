@@ -117,13 +117,14 @@ def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
     if isinstance(value, Scalar):
         tracer = value.tracer
         bounds = (tracer.node(low), tracer.node(high))
-        width = tracer.builder.binary("subtract", bounds[1], bounds[0])
-        known = tracer.known_value(width)
-        if known is not None:
-            tracer.positive[width] = None
-            if known <= 0.0:
+        known = tracer.known_value(bounds[0]), tracer.known_value(bounds[1])
+        if known[0] is not None and known[1] is not None:
+            if any(tracer.builder.as_constant(bound) is None for bound in bounds):
+                tracer.rising[bounds] = None
+            if known[0] >= known[1]:
                 raise InputError(
-                    f"low, high: low must be below high; with these parameters high - low is {known:g}"
+                    f"low, high: low must be below high; with these parameters they are {known[0]:g} and "
+                    f"{known[1]:g}"
                 )
         return tracer.scalar(tracer.laws.hysteresis(tracer, value.node, *bounds, float(initial)))
     if why := _refused.get():

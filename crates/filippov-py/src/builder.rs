@@ -36,11 +36,11 @@ impl Builder {
     }
 }
 
-/// How many of the first rows of parameters leave none of these nodes a number, and none of the others one that is not
-/// positive.
+/// How many of the first rows of parameters leave none of these nodes a number, and of each of these pairs of numbers the first
+/// one below the second.
 pub fn n_rows_without_number(
     graph: &Graph,
-    (nodes, positive): (&[NodeId], &[NodeId]),
+    (nodes, rising): (&[NodeId], &[[NodeId; 2]]),
     table: &PyReadonlyArray2<'_, f64>,
 ) -> PyResult<usize> {
     let (count, width) = (table.shape()[0], table.shape()[1]);
@@ -50,8 +50,11 @@ pub fn n_rows_without_number(
     let mut rows = table.as_slice()?.chunks(width);
     let is_other = |row: &[f64]| {
         let mut values = nodes.iter().map(|&node| graph.value_at(node, row));
-        let mut least = positive.iter().map(|&node| graph.value_at(node, row));
-        values.any(|value| value.is_some()) || least.any(|v| v.is_some_and(|v| v <= 0.0))
+        let mut pairs = rising
+            .iter()
+            .map(|pair| pair.map(|node| graph.value_at(node, row)));
+        let falls = |pair: [Option<f64>; 2]| matches!(pair, [Some(low), Some(high)] if low >= high);
+        values.any(|value| value.is_some()) || pairs.any(falls)
     };
     Ok(rows.position(is_other).unwrap_or(count))
 }
@@ -213,14 +216,17 @@ impl Builder {
     fn n_rows_without_number(
         &self,
         nodes: Vec<u32>,
-        positive: Vec<u32>,
+        rising: Vec<[u32; 2]>,
         table: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<usize> {
         let graph = self.graph();
-        let known = |ids: Vec<u32>| ids.into_iter().map(|id| Self::node(&graph, id)).collect();
-        let nodes: PyResult<Vec<NodeId>> = known(nodes);
-        let positive: PyResult<Vec<NodeId>> = known(positive);
-        n_rows_without_number(&graph, (&nodes?, &positive?), &table)
+        let nodes = nodes.into_iter().map(|id| Self::node(&graph, id));
+        let nodes = nodes.collect::<PyResult<Vec<_>>>()?;
+        let pair = |[low, high]: [u32; 2]| {
+            PyResult::Ok([Self::node(&graph, low)?, Self::node(&graph, high)?])
+        };
+        let rising = rising.into_iter().map(pair).collect::<PyResult<Vec<_>>>()?;
+        n_rows_without_number(&graph, (&nodes, &rising), &table)
     }
 
     fn depends_on_state(&self, a: u32) -> PyResult<bool> {

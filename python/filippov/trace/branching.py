@@ -182,9 +182,9 @@ class Tracer:
         self._continued: dict[int, int] = {}
         self.ends_of_roots: list[int] = []
         self._roots: dict[int, tuple[int, Callable[[int], int] | None]] = {}
-        # Numerators of the quotients inside of arcs; widths of relays that parameters decide.
+        # Numerators of the quotients inside of arcs; thresholds of relays that parameters decide.
         self._divided: dict[int, None] = {}
-        self.positive: dict[int, None] = {}
+        self.rising: dict[tuple[int, int], None] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}

@@ -77,8 +77,8 @@ class Trace:
         How such roots go on, as in a `Source`.
     moving : list of int
         What the functions asked about that other values of the parameters may make a number.
-    positive : list of int
-        What has to be positive: widths of relays, of constants and parameters.
+    rising : list of (int, int)
+        Pairs of constants and parameters of which the first has to be below the second: thresholds of relays.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
     """
@@ -98,16 +98,16 @@ class Trace:
     ends: tuple[tuple[int, float], ...] = ()
     root_ends: str = ""
     moving: list[int] = member(default_factory=list)
-    positive: list[int] = member(default_factory=list)
+    rising: list[tuple[int, int]] = member(default_factory=list)
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def n_rows_without_number(self, table: NDArray[np.float64]) -> int:
         """Return how many of the first rows of parameters switch nothing off, as 0 does ``p * x > 0``."""
-        return self.builder.n_rows_without_number(self.moving, self.positive, table)
+        return self.builder.n_rows_without_number(self.moving, self.rising, table)
 
     def holds_for_all(self) -> bool:
         """Whether no values of the parameters switch anything off."""
-        return not self.moving and not self.positive
+        return not self.moving and not self.rising
 
     @property
     def borders(self) -> tuple[str, ...]:
@@ -258,7 +258,7 @@ def trace(
         ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
         root_ends=root_ends,
         moving=tracer.moving(),
-        positive=list(tracer.positive),
+        rising=list(tracer.rising),
     )
 
 
