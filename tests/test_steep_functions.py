@@ -1,6 +1,7 @@
 """Functions that change by orders of magnitude within a step have their zeros where their arguments say.
 
-A threshold of ``exp(-a x)`` is one of x. Rounding of the large values says nothing of the small ones.
+Comparing ``exp(-a x)`` with a number is the same as comparing x with its logarithm, so the exact zeros are
+known. The search must not use the rounding errors of the large values to judge the small ones.
 """
 
 from __future__ import annotations

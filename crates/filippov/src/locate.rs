@@ -110,7 +110,7 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         let resolved = width.max(EPS * hi.abs());
         let mut converges = inside && step <= 0.5 * last_move;
         if inside && step * doubt <= 0.5 * resolved {
-            // The slope may be that of values so much larger that it tells nothing of this one: is the sign another one behind it?
+            // A slope between values that are much larger does not locate this zero. A second value checks that the sign changes.
             let is_zero = value.abs() >= EPS * g_lo.max(-g_hi) || {
                 let ahead = secant + value.signum() * resolved;
                 let beyond = g(ahead.clamp(lo, hi))?;

@@ -392,7 +392,7 @@ impl StepSearch<'_, '_> {
         let mut bounds = |a: f64, b: f64| along.bound(interpolant, margin, &q, (a, b), sign);
         // Rounding of a function whose terms are not known: that of its values.
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        // It says nothing of a value that is known better: the piece has to be shorter.
+        // Where bounds know a small value better than that, the search cuts the piece into shorter ones.
         let is_lost = |at: f64, value: f64| {
             let is_small = value != 0.0 && value.abs() <= ROUNDING * largest;
             let known = is_small.then(|| bounds(at, at)).flatten();
