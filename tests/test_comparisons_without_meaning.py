@@ -80,13 +80,102 @@ def test_ensembles_and_sweeps_pass_a_parameter_of_zero(values: list[float]) -> N
     assert (found["status"].values == 0).all()
 
 
+def push(t: Any, x: Any, p: float = 0.7) -> Any:
+    """Dry friction, with a push that p = 0 switches off."""
+    return [x[1], -x[0] - 0.2 * np.sign(x[1]) - 0.1 * np.where(p * x[0] > 0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("values", [[0.0, 0.7], [0.7, 0.0]])
+def test_the_returns_of_a_sweep_have_no_mode_of_a_surface_that_is_switched_off(values: list[float]) -> None:
+    section = fl.Section(lambda t, x: x[1] - 0.1)
+    start = (0, 20), [1.7, 0.3]
+    found = fl.sweep(fl.System(push, n=2), *start, {"p": values}, section=section)
+    assert found["surface"].values.tolist() == ["x[1]", "x[0]*p"]
+    assert (found["status"].values == 0).all()
+    texts, sizes = fl.analysis.itineraries(found), found["row_size"].values
+    for p, own in zip(values, np.split(np.arange(len(texts)), np.cumsum(sizes)[:-1]), strict=True):
+        alone = fl.poincare(fl.System(push, n=2), section, *start, {"p": p})
+        assert found["t"].values[own] == pytest.approx(alone["t"].values, abs=1e-9)
+        words = alone["itinerary"].values.tolist()
+        if p == 0.0:  # its only surface is that of the friction
+            words = [" ".join(f"{mode}." for mode in text.split()) for text in words]
+        assert [texts[k] for k in own] == words
+
+
+@pytest.mark.parametrize("values", [[0.0, 0.7], [0.7, 0.0]])
+def test_a_section_given_by_its_number_is_the_same_surface_at_every_point(values: list[float]) -> None:
+    def late(t: Any, x: Any, p: float = 0.7) -> Any:  # the friction is surface 1, and 0 where p = 0
+        pushed = np.where(p * x[0] > 0, 1.0, 0.0)
+        return [x[1], -0.1 * pushed - x[0] - 0.2 * np.sign(x[1])]
+
+    system = fl.System(late, n=2)
+    assert system.surfaces == ["x[0]*p", "x[1]"]
+    found = fl.sweep(system, (0, 20), [1.7, 0.3], {"p": values}, section=1)
+    assert (found["status"].values == 0).all()
+    assert found["x[1]"].values == pytest.approx(np.zeros(found.sizes["obs"]), abs=1e-9)
+    other = fl.sweep(system, (0, 20), [1.7, 0.3], {"p": values}, section=0)
+    off = values.index(0.0)
+    assert other["status"].values.tolist() == [-(k == off) for k in range(2)]
+    assert "no surface 'x[0]*p'" in str(other["message"].values[off])
+
+
 def test_a_sweep_with_returns_names_the_point_that_has_other_surfaces() -> None:
-    system = fl.System(lambda t, x, p=1.0: [-x[0] + np.sign(p * np.sin(t))], n=1)
-    found = fl.sweep(
-        system, (0, 40), y0=[0.5], params={"p": [0.0, 1.0, 2.0]}, section=fl.Phase(2 * np.pi), n=2
-    )
-    assert found["status"].values.tolist() == [-1, 1, 1]
-    assert "other surfaces" in str(found["message"].values[0])
+    def wall(t: Any, x: Any, p: float = 1.0) -> Any:
+        return [-x[0] + np.sign(np.sin(t)) + (np.sign(np.cos(t)) if p == 0 else 0.0)]
+
+    arguments: Any = ((0, 40), [0.5], {"p": [1.0, 0.0, 2.0]})
+    found = fl.sweep(fl.System(wall, n=1), *arguments, section=fl.Phase(2 * np.pi), n=2)
+    assert found["status"].values.tolist() == [1, -1, 1]
+    assert "other surfaces" in str(found["message"].values[1])
+
+
+def level(t: Any, x: Any, p: float) -> Any:
+    return np.where(p * x[1] > 0, 2.0, 3.0)
+
+
+def gear(t: Any, x: Any, p: float) -> Any:
+    return x[0] if p > 0.5 else x[1]
+
+
+@pytest.mark.parametrize("values", [[0.0, 0.7, 0.2], [0.7, 0.2, 0.0], [0.7, 0.0, 0.0], [0.0, 0.0, 0.7]])
+def test_outputs_have_the_form_of_each_point(values: list[float]) -> None:
+    outputs = {"level": level, "gear": gear, "clip": lambda t, x, p: np.clip(x[1], -p, p)}
+    turns = lambda t, x, p=0.7: [x[1], -x[0]]  # noqa: E731
+    system = fl.System(turns, n=2, outputs=outputs)
+    alone = [system.solve((0, 3), [1.7, 0.3], p=p).outputs for p in values]
+    members = system.ensemble((0, 3), [1.7, 0.3], {"p": values}).outputs
+    points = fl.sweep(system, (0, 3), [1.7, 0.3], {"p": values})
+    section = fl.Phase(3.0)
+    returns = fl.sweep(system, (0, 3.5), [1.7, 0.3], {"p": values}, section=section)
+    for name in outputs:
+        exact = [float(found[name][-1]) for found in alone]
+        for found in (members[name], points[name].values, returns[name].values):
+            assert found == pytest.approx(exact, abs=1e-9), name
+
+
+@pytest.mark.parametrize("values", [[0.0, 0.7], [0.7, 0.0]])
+def test_an_output_that_cannot_be_traced_at_one_end_of_a_sweep_is_left_out(values: list[float]) -> None:
+    # A staircase of its own, which p = 0 makes flat.
+    outputs = {"level": level, "floor": lambda t, x, p: np.floor(p * x[1])}
+    system = fl.System(lambda t, x, p=0.7: [x[1], -x[0]], n=2, outputs=outputs)
+    with pytest.warns(FilippovWarning, match="'floor' could not be traced"):
+        found = fl.sweep(system, (0, 3), [1.7, 0.3], {"p": values})
+    assert (found["status"].values == 0).all()
+    assert "level" in found
+    assert "floor" not in found
+
+
+def test_a_store_knows_an_output_of_several_forms(tmp_path: Any) -> None:
+    def system(low: float) -> fl.System:
+        outputs = {"gear": lambda t, x, p: x[0] if p > 0.5 else low}
+        return fl.System(lambda t, x, p=0.7: [x[1], -x[0]], n=2, outputs=outputs)
+
+    arguments: Any = ((0, 3), [1.7, 0.3], {"p": [0.7, 0.2]})
+    for _ in range(2):
+        found = fl.sweep(system(5.0), *arguments, store=tmp_path / "s")
+        assert found["gear"].values[1] == 5.0
+    with pytest.raises(fl.InputError, match="differs in outputs"):
+        fl.sweep(system(6.0), *arguments, store=tmp_path / "s")
 
 
 def test_a_scaling_does_not_fit_where_a_surface_is_switched_off() -> None:

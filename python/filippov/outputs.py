@@ -6,7 +6,7 @@ resets. In a trace they stand behind the states.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +18,7 @@ from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name, names_argument
 from filippov.modes import Mode
 from filippov.prepare import Prepared, parameter_vector
-from filippov.trace.tracer import trace_beside, trace_output
+from filippov.trace.tracer import trace_beside, trace_for_rows
 
 if TYPE_CHECKING:
     from filippov.solution import Solution
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTACT",
     "Output",
+    "TracedOutputs",
     "along",
     "at_ends",
     "check_outputs",
@@ -56,6 +57,46 @@ class Output(NamedTuple):
     name: str
     function: TracedSystem | bytes
     contacts: tuple[int, ...]
+
+
+class TracedOutputs(NamedTuple):
+    """The outputs of a system that the core can compute alone, as they were traced at a point.
+
+    Attributes
+    ----------
+    found : tuple of Output
+    left : tuple of str
+        The names of those that could not be traced.
+    at : ndarray, shape (p,)
+        The values of the parameters there.
+    events : tuple of TracedEvent
+        The outputs again, in the form that knows for which values it holds.
+    """
+
+    found: tuple[Output, ...]
+    left: tuple[str, ...]
+    at: Array
+    events: tuple[TracedEvent, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the outputs that were traced."""
+        return tuple(output.name for output in self.found)
+
+    def chosen(self, names: Collection[str]) -> TracedOutputs:
+        """Return those of them that have these names."""
+        pairs = zip(self.found, self.events, strict=True)
+        kept = [(output, event) for output, event in pairs if output.name in names]
+        return self._replace(
+            found=tuple(output for output, _ in kept), events=tuple(event for _, event in kept)
+        )
+
+    def n_valid(self, table: Array) -> int:
+        """Return for how many of the first rows of parameter values, (k, p), the outputs have this form."""
+        if not self.events:
+            return len(table)
+        rows = np.vstack([self.at, table])
+        return min(event.n_valid(rows) for event in self.events) - 1
 
 
 def check_outputs(outputs: Any, reserved: tuple[str, ...]) -> dict[str, Callable[..., Any]]:
@@ -107,7 +148,7 @@ def along(
     assert solution.sol is not None
     states = solution.sol(times, side)
     if prepared.trace is not None and isinstance(run, Run) and len(times):
-        found, _ = _traced(system, prepared, reads, times[0], states[:, 0], values)
+        found = _traced(system, prepared, reads, times[0], states[:, 0], values)
         if isinstance(found, TracedEvent):
             p, is_left = parameter_vector(values), side == "left"
             return run.signal(found, np.ascontiguousarray(times), p, is_left, list(reads.surfaces))
@@ -156,17 +197,22 @@ def at_ends(
     members: Iterable[tuple[Prepared, Run, dict[str, float]]],
 ) -> Array:
     """Return the values of a function at the ends of runs, of which nothing else need be kept."""
-    known: dict[int, TracedEvent] = {}  # by the trace beside which it holds for all parameters
+    # By the trace beside which it was traced; and the values of the parameters there.
+    known: dict[int, tuple[TracedEvent, Array]] = {}
     found = []
     for prepared, run, values in members:
         reads = _Reads(prepared, fun, values)
-        event: TracedEvent | str | None = known.get(id(prepared))
+        p = parameter_vector(values)
+        event: TracedEvent | str | None = None
+        if id(prepared) in known:
+            kept, at = known[id(prepared)]
+            event = kept if kept.n_valid(np.vstack([at, p])) == 2 else None
         if event is None and prepared.trace is not None:
-            event, holds = _traced(system, prepared, reads, run.t_last, run.y_last, values)
-            if isinstance(event, TracedEvent) and holds:
-                known[id(prepared)] = event
+            event = _traced(system, prepared, reads, run.t_last, run.y_last, values)
+            if isinstance(event, TracedEvent):
+                known[id(prepared)] = event, p
         if isinstance(event, TracedEvent):
-            found.append(run.signal_at_end(event, parameter_vector(values), list(reads.surfaces)))
+            found.append(run.signal_at_end(event, p, list(reads.surfaces)))
             continue
         _refuse_sliding(prepared, role, fun, [Mode(run.mode_last)])
         contacts = run.contacts_at_end()[list(reads.surfaces)]
@@ -178,21 +224,22 @@ def at_ends(
 
 def traced_outputs(
     system: System, prepared: Prepared, t0: float, y0: Array, values: dict[str, float]
-) -> tuple[tuple[Output, ...], tuple[str, ...]]:
-    """Return the outputs that the core can compute alone, and the names of the others."""
-    found, left = [], []
+) -> TracedOutputs:
+    """Return the outputs that the core can compute alone, traced at a point."""
+    found, left, events = [], [], []
     for name, fun in system.outputs.items():
         reads = _Reads(prepared, fun, values)
         traced: Any = ""
         if prepared.trace is not None:
             args = () if system._source is None else system._source.args
             start = reads.extended(y0)
-            traced = trace_output(prepared.trace, reads.function, args, t0=t0, y0=start, parameters=values)
-        if isinstance(traced, TracedSystem):
-            found.append(Output(name, traced, reads.surfaces))
-        else:
+            traced = trace_for_rows(prepared.trace, reads.function, args, t0=t0, y0=start, parameters=values)
+        if isinstance(traced, str):
             left.append(name)
-    return tuple(found), tuple(left)
+        else:
+            found.append(Output(name, traced[0], reads.surfaces))
+            events.append(traced[1])
+    return TracedOutputs(tuple(found), tuple(left), parameter_vector(values), tuple(events))
 
 
 def contacts_of(prepared: Prepared) -> dict[int, list[str]]:
@@ -282,8 +329,8 @@ def _refuse_sliding(prepared: Prepared, role: str, fun: Callable[..., Any], mode
 
 def _traced(
     system: System, prepared: Prepared, reads: _Reads, t: float, x: Array, values: dict[str, float]
-) -> tuple[TracedEvent | str, bool]:
-    """Return what a function was traced to, and whether it holds for all parameters."""
+) -> TracedEvent | str:
+    """Return what a function was traced to, or why it was not."""
     assert prepared.trace is not None
     args = () if system._source is None else system._source.args
     start = reads.extended(x)

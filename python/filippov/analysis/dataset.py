@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from filippov.analysis.grid import Grid
 from filippov.analysis.optional import need
-from filippov.analysis.points import WARNINGS, Table
+from filippov.analysis.points import NO_SURFACE, WARNINGS, Table
 
 __all__ = ["REASONS", "Variable", "dataset_of", "kinds_of", "variables_of"]
 
@@ -129,7 +129,8 @@ def variables_of(
         ),
     )
     if n_surfaces:
-        flags = {"flag_values": [-1, 0, 1], "flag_meanings": "h_negative sliding h_positive"}
+        meanings = "h_negative sliding h_positive no_surface"
+        flags = {"flag_values": [-1, 0, 1, NO_SURFACE], "flag_meanings": meanings}
         yield Variable("mode", "piece", "modes", None, attributes("mode of the piece", more=flags))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -91,14 +91,24 @@ class Grid(NamedTuple):
 
     def first(self) -> tuple[Array, dict[str, float]]:
         """Return initial state and parameters of the first point that is finite, else of the first."""
-        for start, stop in self.blocks():
+        return self._finite_point(self.blocks(), 0)
+
+    def last(self) -> tuple[Array, dict[str, float]]:
+        """Return initial state and parameters of the last point that is finite, else of the last."""
+        return self._finite_point(reversed(list(self.blocks())), -1)
+
+    def _finite_point(self, blocks: Iterable[tuple[int, int]], end: int) -> tuple[Array, dict[str, float]]:
+        """Return the point at an end, 0 or -1, of the finite ones in the first of these blocks with such."""
+        found: tuple[Array, Array] | None = None
+        for start, stop in blocks:
             y0, p = self.rows(start, stop)
             finite = np.flatnonzero(np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1))
             if len(finite):
-                row = int(finite[0])
-                return y0[row].copy(), dict(zip(self.names, p[row].tolist(), strict=True))
-        y0, p = self.rows(0, 1)
-        return y0[0].copy(), dict(zip(self.names, p[0].tolist(), strict=True))
+                found = y0[finite[end]], p[finite[end]]
+                break
+            found = found or (y0[end], p[end])
+        assert found is not None
+        return found[0].copy(), dict(zip(self.names, found[1].tolist(), strict=True))
 
     @property
     def shape(self) -> tuple[int, ...]:

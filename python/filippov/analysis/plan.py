@@ -26,10 +26,10 @@ from filippov.analysis.points import (
     outputs_for,
     run_task,
 )
-from filippov.analysis.sections import Phase, Place, clocks_of
+from filippov.analysis.sections import Phase, Place, by_name, clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.options import Options
-from filippov.outputs import Output, traced_outputs
+from filippov.outputs import Output, TracedOutputs, traced_outputs
 from filippov.prepare import Prepared
 from filippov.sliding_policy import fit_kappa
 
@@ -141,6 +141,28 @@ class Piece(NamedTuple):
     begins_line: bool
 
 
+class _Form(NamedTuple):
+    """What a sweep is at some neighbouring points.
+
+    Attributes
+    ----------
+    prepared : Prepared
+    place : Place or None
+        The section beside this system.
+    columns : tuple of int or None
+        As `Task.columns`.
+    outputs : tuple of Output
+    n_points : int
+        The number of points for which this holds.
+    """
+
+    prepared: Prepared
+    place: Place | None
+    columns: tuple[int, ...] | None
+    outputs: tuple[Output, ...]
+    n_points: int
+
+
 class Plan(NamedTuple):
     """A sweep that was checked.
 
@@ -156,7 +178,7 @@ class Plan(NamedTuple):
     units : dict
     attributes : dict
         Attributes of the result.
-    outputs : tuple of Output
+    outputs : TracedOutputs
         The outputs that the result has.
     """
 
@@ -170,12 +192,7 @@ class Plan(NamedTuple):
     follows: bool
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
-    outputs: tuple[Output, ...]
-
-    @property
-    def output_names(self) -> tuple[str, ...]:
-        """The names of the outputs that the result has."""
-        return tuple(output.name for output in self.outputs)
+    outputs: TracedOutputs
 
     @property
     def n_points(self) -> int:
@@ -225,36 +242,31 @@ class Plan(NamedTuple):
         parts: list[Task | Table] = []
         t0 = self.t_span[0]
         for own, prepared in groups_of(self.system, self.prepared, t0, y0, self.grid.names, p):
-            place: Place | None | Exception = self.place
-            outputs: tuple[Output, ...] | Exception = self.outputs
-            if prepared is not self.prepared and not isinstance(prepared, Exception):
-                place = self._place_for(prepared, y0[own], p[own])
-                if not isinstance(place, Exception):
-                    outputs = self._outputs_for(prepared, y0[own], p[own])
-            error = next((each for each in (prepared, place, outputs) if isinstance(each, Exception)), None)
-            if (
-                isinstance(prepared, Exception)
-                or isinstance(place, Exception)
-                or isinstance(outputs, Exception)
-            ):
-                failed = (str(error), "not_prepared", all_spans[own, 0], y0[own])
-                parts.append(failed_table(*failed, len(self.prepared.surfaces), len(self.outputs)))
-                continue
-            clocks, spans = all_clocks[own], all_spans[own]
-            task = Task(
-                prepared,
-                place,
-                clocks,
-                spans,
-                y0[own],
-                self.grid.names,
-                p[own],
-                self.options,
-                limits,
-                outputs,
-                threads,
-            )
-            parts.append(task.travelling() if travels else task)
+            start = own.start
+            while start < own.stop:
+                left = slice(start, own.stop)
+                form = self._form_for(prepared, y0[left], p[left])
+                if isinstance(form, Exception):
+                    failed = (str(form), "not_prepared", all_spans[left, 0], y0[left])
+                    parts.append(failed_table(*failed, len(self.prepared.surfaces), len(self.outputs.found)))
+                    break
+                start += form.n_points
+                points = slice(left.start, start)
+                task = Task(
+                    form.prepared,
+                    form.place,
+                    all_clocks[points],
+                    all_spans[points],
+                    y0[points],
+                    self.grid.names,
+                    p[points],
+                    self.options,
+                    limits,
+                    form.outputs,
+                    threads,
+                    form.columns,
+                )
+                parts.append(task.travelling() if travels else task)
         given = [k for k, name in enumerate(self.system.discrete) if name in self.grid.dims]
         return Chunk(tuple(parts), self.follows, carry, tuple(given))
 
@@ -262,37 +274,43 @@ class Plan(NamedTuple):
         """Return the table of a piece that was not begun."""
         y0, p, clocks, spans = self.points(piece.start, piece.stop)
         task = Task(
-            self.prepared, None, clocks, spans, y0, self.grid.names, p, self.options, (), self.outputs, 1
+            self.prepared,
+            None,
+            clocks,
+            spans,
+            y0,
+            self.grid.names,
+            p,
+            self.options,
+            (),
+            self.outputs.found,
+            1,
         )
         return not_run(task, len(self.prepared.surfaces))
 
-    def _place_for(self, prepared: Prepared, y0: Array, p: Array) -> Place | None | Exception:
-        """Return the section for a system that holds for some parameter values only."""
+    def _form_for(self, prepared: Prepared | Exception, y0: Array, p: Array) -> _Form | Exception:
+        """Return the form of the sweep at the first of some points, for all of which a system holds."""
+        if isinstance(prepared, Exception):
+            return prepared
+        t0, first = self.t_span[0], y0[0].copy()
+        values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
+        place, columns, outputs = self.place, None, self.outputs
         try:
-            fit_kappa(self.options.sliding, prepared.surfaces)
+            if prepared is not self.prepared:
+                fit_kappa(self.options.sliding, prepared.surfaces)
+                if self.observed is not None:
+                    columns = _columns(self.prepared.surfaces, prepared.surfaces)
+                    section = self.observed.section
+                    if columns is not None:
+                        section = by_name(section, self.prepared.surfaces)
+                    place = section.place(prepared, self.grid.states, t0, first, values)
         except InputError as error:
             return error
-        if self.observed is None:
-            return None
-        if len(prepared.surfaces) != len(self.prepared.surfaces):
-            # The returns of all points have modes in one table, a column for each surface.
-            return InputError(
-                "the function has other surfaces for these parameter values; make a sweep for each side"
-            )
-        values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
-        section, t0 = self.observed.section, self.t_span[0]
-        try:
-            return section.place(prepared, self.grid.states, t0, y0[0].copy(), values)
-        except InputError as error:
-            return error
-
-    def _outputs_for(self, prepared: Prepared, y0: Array, p: Array) -> tuple[Output, ...] | Exception:
-        """Return the outputs beside a system that holds for some parameter values only."""
-        values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
-        found, _ = traced_outputs(self.system, prepared, self.t_span[0], y0[0].copy(), values)
-        if tuple(output.name for output in found) != self.output_names:
-            return InputError("outputs: other ones can be traced for these parameter values")
-        return found
+        if prepared is not self.prepared or not outputs.n_valid(p[:1]):
+            outputs = traced_outputs(self.system, prepared, t0, first, values).chosen(self.outputs.names)
+            if outputs.names != self.outputs.names:
+                return InputError("outputs: other ones can be traced for these parameter values")
+        return _Form(prepared, place, columns, outputs.found, outputs.n_valid(p))
 
     def identity(self) -> dict[str, str]:
         """Return what the result follows from, as digests and text."""
@@ -307,8 +325,10 @@ class Plan(NamedTuple):
             code = core.to_bytes() if isinstance(core, TracedSystem) else surfaces
             maps = [action._replace(map=_digest_of_traced(action.map)) for action in self.prepared.actions]
         digests = [sha256() for _ in range(3)]
+        has_one_form = True
         for start, stop in self.grid.blocks():
             y0, p, clocks, spans = self.points(start, stop)
+            has_one_form = has_one_form and self.outputs.n_valid(p) == len(p)
             for digest, data in zip(
                 digests, (y0.tobytes(), p.tobytes(), spans.tobytes() + clocks.tobytes()), strict=True
             ):
@@ -318,6 +338,17 @@ class Plan(NamedTuple):
             function = place.function
             called = identity_of(function, "section") if place.is_called else ""
             place = place._replace(function=called or _digest_of_traced(function))
+        outputs: list[Any]
+        if has_one_form:
+            outputs = [
+                [output.name, _digest_of_traced(output.function), output.contacts]
+                for output in self.outputs.found
+            ]
+        else:
+            given = self.system.outputs
+            outputs = [
+                [name, identity_of(given[name], f"the output {name!r}")] for name in self.outputs.names
+            ]
         return {
             "system": _digest(code),
             "resets": as_json(maps),
@@ -329,13 +360,27 @@ class Plan(NamedTuple):
             "follow": str(self.follows),
             "options": self.attributes["options"],
             "units": as_json(dict(self.units)),
-            "outputs": as_json(
-                [
-                    [output.name, _digest_of_traced(output.function), output.contacts]
-                    for output in self.outputs
-                ]
-            ),
+            "outputs": as_json(outputs),
         }
+
+
+def _columns(surfaces: tuple[str, ...], own: tuple[str, ...]) -> tuple[int, ...] | None:
+    """Return the number that each surface of the sweep has at a point; -1 if the point has none of its name.
+
+    The modes of all points are in one table, a column for each surface.
+
+    Raises
+    ------
+    InputError
+        If the point has a surface that the sweep does not have.
+    """
+    if len(own) == len(surfaces) and set(own) != set(surfaces):
+        return None  # other numbers in the texts, or other branches: each stands in the column of its number
+    if not set(own) <= set(surfaces) or len(set(surfaces)) < len(surfaces):
+        raise InputError(
+            "the function has other surfaces for these parameter values; make a sweep for each side"
+        )
+    return tuple(own.index(name) if name in own else -1 for name in surfaces)
 
 
 def _digest(data: bytes) -> str:
@@ -362,7 +407,7 @@ def plan_of(
     state, values = grid.first()
     variables = variables_of(grid, len(prepared.surfaces), observed is not None, units, ())
     taken = {*(variable.name for variable in variables), *grid.dims, *grid.names}
-    outputs = outputs_for(system, prepared, t0, state, values, taken)
+    outputs = outputs_for(system, prepared, t0, [grid.first(), grid.last()], taken)
     if observed is not None:
         place = observed.section.place(prepared, grid.states, t0, state, values)
     shown = {name: value for name, value in options.by_name().items() if name not in _NOT_SHOWN}

@@ -16,7 +16,7 @@ from filippov.caution import warn_user
 from filippov.errors import FilippovError, InputError, Interrupted
 from filippov.events import bind_function, selective
 from filippov.options import Options
-from filippov.outputs import Output, traced_outputs
+from filippov.outputs import Output, TracedOutputs, traced_outputs
 from filippov.prepare import MEMORY, Prepared
 from filippov.saving import packed, unpacked
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from filippov.system import System
 
 __all__ = [
-    *("WARNINGS", "Observation", "Table", "Task"),
+    *("NO_SURFACE", "WARNINGS", "Observation", "Table", "Task"),
     *("concatenate", "not_run", "prepare_for", "prepare_for_all", "run_task"),
 ]
 
@@ -34,6 +34,9 @@ Table = dict[str, Any]
 
 # The kinds of warnings, in the order of their bits. Part of the format of stores: only added to at the end.
 WARNINGS = (*warning_codes(), MEMORY)
+
+# What stands in a mode for a surface that the system does not have at this point of a sweep.
+NO_SURFACE = 2
 
 # The columns of a table, by what one row belongs to. Texts are lists.
 POINT_COLUMNS = (
@@ -87,6 +90,8 @@ class Task(NamedTuple):
     outputs : tuple of Output
         The outputs of the system that are wanted.
     threads : int
+    columns : tuple of int, or None
+        For each surface of the sweep its number in `system`, -1 if it is none there; None where all are.
     memory : ndarray, shape (n_points, n_laws), or None
         Discrete states that other runs left; NaN, and None: as at any start.
     """
@@ -102,6 +107,7 @@ class Task(NamedTuple):
     limits: tuple[Any, ...]
     outputs: tuple[Output, ...]
     threads: int
+    columns: tuple[int, ...] | None = None
     memory: Array | None = None
 
     def rows(self, chosen: slice) -> Task:
@@ -171,7 +177,8 @@ def run_task(task: Task) -> Table:
         try:
             tables.append(_run(one._replace(threads=1), prepared, place._replace(function=bound)))
         except Interrupted as cut:
-            left = not_run(task.rows(slice(row + 1, None)), len(prepared.surfaces))
+            n_surfaces = len(prepared.surfaces if task.columns is None else task.columns)
+            left = not_run(task.rows(slice(row + 1, None)), n_surfaces)
             raise Interrupted(partial=concatenate([*tables, cut.partial, left])) from None
     return concatenate(tables)
 
@@ -201,6 +208,10 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
         task.threads,
         task.memory,
     )
+    if task.columns is not None:
+        modes = table["modes"]
+        absent = np.full(len(modes), NO_SURFACE, dtype=np.int8)
+        table["modes"] = np.column_stack([modes, absent])[:, list(task.columns)]
     raised = table.pop("raised")
     for code, _ in prepared.warnings:
         begun = np.array([reason != "not_run" for reason in table["reason"]])
@@ -278,9 +289,9 @@ def prepare_for_all(system: System, t0: float, grid: Grid) -> Prepared:
     prepared = prepare_for(system, t0, *grid.first())
     if prepared.pinned is None:
         return prepared
-    y0, p = grid.rows(grid.n_points - 1, grid.n_points)
+    y0, values = grid.last()
     try:
-        other = system.prepare(y0.shape[1], t0, y0[0], dict(zip(grid.names, p[0].tolist(), strict=True)))
+        other = system.prepare(len(y0), t0, y0, values)
     except Exception:
         return prepared
     return prepared if other.pinned is not None else other
@@ -290,11 +301,12 @@ def outputs_for(
     system: System,
     prepared: Prepared,
     t0: float,
-    y0: Array,
-    values: dict[str, float],
+    points: Sequence[tuple[Array, dict[str, float]]],
     taken: Collection[str] = (),
-) -> tuple[Output, ...]:
-    """Return the outputs of a system; those that cannot be traced are named in a warning.
+) -> TracedOutputs:
+    """Return the outputs of a system as they are at the first of some points.
+
+    Those that cannot be traced at every one of these points are left out, and named in a warning.
 
     Raises
     ------
@@ -304,15 +316,16 @@ def outputs_for(
     for name in system.outputs:
         if name in taken:
             raise InputError(f"outputs: {name!r} is the name of something else in the result; rename it")
-    found, left = traced_outputs(system, prepared, t0, y0, values)
+    traced = [traced_outputs(system, prepared, t0, y0, values) for y0, values in points]
+    left = dict.fromkeys(name for each in traced for name in each.left)
     if left:
         warn_user(
             [
-                f"outputs: {', '.join(map(repr, left))} could not be traced beside the right-hand side, and "
-                "the result does not have them"
+                f"outputs: {', '.join(map(repr, left))} could not be traced beside the right-hand "
+                "side, and the result does not have them"
             ]
         )
-    return found
+    return traced[0].chosen([name for name in traced[0].names if name not in left])
 
 
 def groups_of(

@@ -111,6 +111,8 @@ def expand_returns(result: Any, *variables: str) -> Any:
 def itineraries(result: Any) -> list[str]:
     """Return the modes between returns as text, one entry per return: ``"+ 0 -"``.
 
+    A point of a surface that is not there, because a parameter switches it off, is written as ``.``.
+
     Parameters
     ----------
     result : xarray.Dataset

@@ -13,7 +13,7 @@ from filippov.analysis.dataset import as_json, kinds_of
 from filippov.analysis.grid import grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
-from filippov.analysis.points import Table, Task, end_times, outputs_for, prepare_for, run_task
+from filippov.analysis.points import NO_SURFACE, Table, Task, end_times, outputs_for, prepare_for, run_task
 from filippov.analysis.sections import AnySection, Phase, clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
@@ -159,7 +159,7 @@ def poincare(
     place = own.place(prepared, grid.states, span[0], state, values)
     clocks = clocks_of(own, grid.names, p_rows)
     ends = end_times(own, span, observed.transient + observed.n, clocks)
-    outputs = outputs_for(system, prepared, span[0], state, values, (*_OWN, *grid.names))
+    outputs = outputs_for(system, prepared, span[0], [(state, values)], (*_OWN, *grid.names))
     task = Task(
         prepared,
         place,
@@ -170,10 +170,10 @@ def poincare(
         p_rows,
         checked,
         (observed.transient, observed.n, observed.cycle),
-        outputs,
+        outputs.found,
         1,
     )
-    names = [output.name for output in outputs]
+    names = outputs.names
     given = {"section": repr(own), "params": as_json(values), "options": as_json(checked._asdict())}
     report = _report(options.get("progress"), (span[0], float(ends[0])), own, n)
     try:
@@ -252,11 +252,15 @@ def _dataset(
 
 
 def texts_of(modes: npt.NDArray[np.int8], sizes: npt.NDArray[np.int32]) -> list[str]:
-    """Return the modes between returns as text, one entry per return: ``"+ 0 -"``."""
+    """Return the modes between returns as text, one entry per return: ``"+ 0 -"``; ``.`` for no surface."""
     # Few different modes occur, however many pieces there are.
     different, which = np.unique(modes, axis=0, return_inverse=True)
-    names = [str(Mode(mode)) for mode in different.tolist()]
+    names = [_word_of(mode) for mode in different.tolist()]
     words = [names[k] for k in which.reshape(-1).tolist()]
     ends = np.cumsum(sizes)
     starts = ends - sizes
     return [" ".join(words[a:b]).strip() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+
+
+def _word_of(mode: list[int]) -> str:
+    return "".join("." if entry == NO_SURFACE else str(Mode((entry,))) for entry in mode)

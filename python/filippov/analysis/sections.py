@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.unknown import did_you_mean
 
-__all__ = ["Phase", "Place", "Section", "Tangency", "as_section"]
+__all__ = ["Phase", "Place", "Section", "Tangency", "as_section", "by_name", "clocks_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -344,6 +345,16 @@ def clocks_of(section: AnySection, names: Sequence[str], p: Array) -> Array:
     if isinstance(section, Phase) and section.of is None:
         return section.clocks({name: p[:, k] for k, name in enumerate(names)}, len(p))
     return np.zeros((len(p), 2))
+
+
+def by_name(section: AnySection, surfaces: tuple[str, ...]) -> AnySection:
+    """Return a section that names its surface, one of these, also where its number was given."""
+    found = copy(section)
+    if isinstance(found, Section) and isinstance(found.where, int | np.integer):
+        found.where = surfaces[_surface_index(found.where, surfaces)]
+    if isinstance(found, Tangency) and isinstance(found.surface, int | np.integer):
+        found.surface = surfaces[_surface_index(found.surface, surfaces)]
+    return found
 
 
 def _surface_index(surface: Any, surfaces: tuple[str, ...]) -> int:

@@ -220,7 +220,7 @@ class Store:
         zarr = need("zarr", "store=")
         surfaces = plan.prepared.surfaces
         has_section = plan.observed is not None
-        variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units, plan.output_names))
+        variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units, plan.outputs.names))
         sizes = {"point": plan.n_points, "obs": 0, "piece": 0}
         for index in range(count):
             table = self.read(index, "row_size", "n_pieces")

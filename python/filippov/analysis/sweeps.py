@@ -106,7 +106,8 @@ def sweep(
         With one ``n_returns``, ``period`` (0: none found), ``row_size``, and along ``obs`` the returns of all
         points one after the other (a contiguous ragged array as in the CF conventions): ``t``, every state,
         every output (its value just before, where it jumps),
-        ``return_time``, ``sliding_time``, ``n_pieces``; along ``piece`` the modes in between. ``None`` with
+        ``return_time``, ``sliding_time``, ``n_pieces``; along ``piece`` the modes in between, with 2 for a
+        surface that a parameter switches off at this point. ``None`` with
         `part` while other parts are missing.
 
     Raises
@@ -308,7 +309,7 @@ def _dataset(plan: Plan, tables: list[Table | None]) -> Any:
     has_section = plan.observed is not None
     return dataset_of(
         *(plan.grid, whole, plan.prepared.surfaces, has_section, plan.units, plan.attributes),
-        plan.output_names,
+        plan.outputs.names,
     )
 
 

@@ -19,7 +19,7 @@ from filippov.analysis.grid import Grid, check_size, grid_of
 from filippov.analysis.observe import check_keywords, check_system, options_of, span_of
 from filippov.analysis.optional import need
 from filippov.analysis.points import Task, end_times, groups_of, prepare_for_all, run_task
-from filippov.analysis.sections import AnySection, Phase, as_section, clocks_of
+from filippov.analysis.sections import AnySection, Phase, as_section, by_name, clocks_of
 from filippov.caution import warn_user
 from filippov.cycles.motions import Array
 from filippov.derivatives import refuse_without_derivatives
@@ -150,6 +150,8 @@ def lyapunov(
         else:
             report = report_of_members(progress, len(rows)) if progress.is_wanted else None
             watched = work._replace(options=work.options._replace(progress=report))
+            if anchor is not None and len(own.surfaces) != len(prepared.surfaces):
+                watched = watched._replace(section=by_name(anchor, prepared.surfaces))
             rows += _rows_of(watched, own, y0_rows[chosen], p_rows[chosen])
             new = rows[progress.done :]
             progress.add(len(new), sum(row.status < 0 for row in new))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from filippov.trace.laws import Laws
     from filippov.trace.stand_ins import StandIns
 
-__all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
+__all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_for_rows", "trace_output"]
 
 # What a warning says of an event or a section with a law that the run does not follow.
 OWN_LAW = "it has a floor, a relay or a table that the run does not follow"
@@ -302,10 +302,10 @@ def trace_beside(
     t0: float,
     y0: NDArray[Any],
     parameters: Mapping[str, float],
-) -> tuple[TracedEvent | str, bool]:
-    """Return what `trace_event` returns, and whether it holds for all values of the parameters."""
+) -> TracedEvent | str:
+    """Return what `trace_event` returns, for a function that is evaluated at points."""
     found = _beside(traced, g, args, t0, y0, parameters)
-    return (found, False) if isinstance(found, str) else (found[0], not found[1].guards)
+    return found if isinstance(found, str) else found[0]
 
 
 def trace_output(
@@ -327,6 +327,32 @@ def trace_output(
     _, tracer, node = found
     if tracer.guards:
         return "it has a condition on parameters"
+    return _as_component(tracer, node)
+
+
+def trace_for_rows(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t0: float,
+    y0: NDArray[Any],
+    parameters: Mapping[str, float],
+) -> tuple[TracedSystem, TracedEvent] | str:
+    """Return what `trace_output` returns, and the event that knows for which parameters it holds.
+
+    A function with a condition on parameters is traced too, for those that decide it as these do.
+    """
+    found = _beside(traced, g, args, t0, y0, parameters)
+    if isinstance(found, str):
+        return found
+    event, tracer, node = found
+    component = _as_component(tracer, node)
+    return component if isinstance(component, str) else (component, event)
+
+
+def _as_component(tracer: Tracer, node: int) -> TracedSystem | str:
+    """Return a system whose first component is this node."""
     if tracer.own_levels:
         return OWN_LAW
     field = [node] + [tracer.builder.constant(0.0)] * (tracer.n_states - 1)
