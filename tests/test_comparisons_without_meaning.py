@@ -340,3 +340,43 @@ def test_equilibria_where_a_comparison_is_that_of_a_parameter() -> None:
     system = fl.System(lambda t, x, p=0.5: [x[1], -x[0] - 0.2 * (p * np.exp(x[1]) > 0) - 0.3 * x[1]], n=2)
     (found,) = fl.equilibria(system, [(-2.0, 2.0), (-2.0, 2.0)])
     assert found.y == pytest.approx([-0.2, 0.0], abs=1e-12)
+
+
+def drive(t: Any, x: Any) -> Any:
+    return -x[0] - 0.3 * x[1] + np.sin(0.6 * t)
+
+
+# Smooth near p = 0: the cycle goes through, and takes the surface from its other side.
+SOFT: dict[str, Any] = {
+    "stop": lambda t, x, p: [x[1], drive(t, x) - 0.5 * np.maximum(p * x[1], 0.0)],
+    "drag": lambda t, x, p: [x[1], drive(t, x) - 0.5 * x[1] * np.abs(p * x[1])],
+}
+
+
+@pytest.mark.parametrize("name", SOFT)
+def test_a_branch_of_cycles_goes_through_a_value_that_switches_a_surface_off(name: str) -> None:
+    system = fl.System(SOFT[name], n=2, params={"p": 0.3})
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 0.0]), "p", (-0.2, 0.5))
+    assert [(s.code, s.params["p"]) for s in branch.special] == [("EP", -0.2), ("CO", 0.0), ("EP", 0.5)]
+    assert "switches the surface off" in branch.special[1].kind
+    for p in (-0.2, -0.07, 0.0, 0.07, 0.5):
+        alone = fl.limit_cycle(fl.System(SOFT[name], n=2, params={"p": p}), [1.0, 0.0])
+        found = branch.at(p=p)
+        times = np.linspace(0.0, alone.period, 7)
+        for t in times:
+            assert found.at(t) == pytest.approx(alone.at(t), abs=1e-8)
+    # At 0 it is a linear oscillator: x is the imaginary part of exp(0.6 i t)/(1 - 0.36 + 0.18 i).
+    still = branch.at(p=0.0)
+    assert still.itinerary.legs[0].mode == ()
+    for t in (0.0, 1.0, 5.0):
+        exact = (np.exp(0.6j * t) / (0.64 + 0.18j)).imag
+        assert still.at(t)[0] == pytest.approx(exact, abs=1e-8)
+
+
+def test_a_branch_of_equilibria_goes_through_a_value_that_switches_a_surface_off() -> None:
+    system = fl.System(lambda t, x, p=0.5: [-x[0] - 0.3 * np.maximum(p * x[0], 0.0) + 1.0], n=1)
+    branch = fl.continuation(fl.equilibrium(system, [0.9]), "p", (-0.5, 1.0))
+    assert [(s.code, s.params["p"]) for s in branch.special] == [("EP", -0.5), ("BE", 0.0), ("EP", 1.0)]
+    for p in (-0.5, 0.0, 0.25, 1.0):
+        assert branch.at(p=p).y[0] == pytest.approx(1.0 / (1.0 + 0.3 * max(p, 0.0)), abs=1e-10)
+    assert branch.at(p=0.0).mode == ()

@@ -17,11 +17,11 @@ from filippov.cycles.arclength import Place, Step, corrected, guess_through, nea
 from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.codimension_two import CODIMENSION_TWO
-from filippov.cycles.cycle import Cycle, cycle_of, in_parts
+from filippov.cycles.cycle import Cycle, cycle_at, cycle_of, in_parts
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
 from filippov.cycles.monitors import Monitor, monitors_of
-from filippov.cycles.motions import Array
+from filippov.cycles.motions import Array, Motions
 from filippov.cycles.passing import (
     SHORT,
     back_from_change,
@@ -70,6 +70,8 @@ _NO_DURATION, _VANISHES = 1e-13, 1e-9
 # How near to 1 or -1 a multiplier is at a fold or a period doubling.
 _CRITICAL = 1e-3
 _SAVED_EVERY = 50
+# A run to the cycle at a value that switches a surface off starts that near to it: a part of the way.
+_BESIDE_VALUE = 1e-3
 # So many points of a cycle are looked at to see whether a state is on it.
 _PHASES = 40
 # An eigenvalue is real if its imaginary part is that part of it, or less, or rounding: a part of the matrix.
@@ -302,6 +304,8 @@ def curve_of(state: State, names: tuple[str, ...], sizes: tuple[float, ...]) -> 
 def at_value(state: State, name: str, value: float, most_halvings: int = 5) -> State:
     """Return the cycle or equilibrium with the same itinerary at another value of a parameter.
 
+    Where that value switches a surface off, it has the pieces that are left.
+
     Raises
     ------
     ModelError
@@ -318,14 +322,32 @@ def at_value(state: State, name: str, value: float, most_halvings: int = 5) -> S
 
 
 def _at_value(state: State, name: str, value: float) -> State:
-    if isinstance(state, Cycle):
-        motions = state._shooting.motions.with_derivatives_by(())
-        motions.use({**state.params, name: value})
-        return cycle_of(motions, state._parts, state._shooting.period)
-    motions = state._curve.motions.with_derivatives_by(())
+    own = state._shooting.motions if isinstance(state, Cycle) else state._curve.motions
+    motions = own.with_derivatives_by(())
     motions.use({**state.params, name: value})
-    curve = EquilibriumCurve(motions, state._curve.mode)
+    surfaces, left = own.prepared.surfaces, motions.prepared.surfaces
+    if isinstance(state, Cycle):
+        if len(left) != len(surfaces):
+            return _of_the_flow(
+                motions, at_value(state, name, value + _BESIDE_VALUE * (state.params[name] - value))
+            )
+        return cycle_of(motions, state._parts, state._shooting.period)
+    mode = state._curve.mode
+    if len(left) < len(surfaces):
+        kept = [surface in left for surface in surfaces] + [True] * (len(mode) - len(surfaces))
+        mode = tuple(entry for entry, is_kept in zip(mode, kept, strict=True) if is_kept)
+    curve = EquilibriumCurve(motions, mode)
     return rest_of(curve, state._w[: curve.n_unknowns])
+
+
+def _of_the_flow(motions: Motions, near: State) -> Cycle:
+    """Return the cycle near another one, with the pieces of a run from the middle of its longest leg."""
+    assert isinstance(near, Cycle)
+    itinerary = near.itinerary
+    k = int(np.argmax(itinerary.durations))
+    motions.begin_with(itinerary.legs[k].discrete)
+    t = near.t0 + sum(itinerary.durations[:k]) + 0.5 * itinerary.durations[k]
+    return cycle_at(motions, t, near.at(t), near.period, near._shooting.period)
 
 
 class _Position(NamedTuple):
@@ -857,7 +879,7 @@ class _Side:
         if code not in self.settings.detect:
             return
         name = self.settings.name
-        surface, t = "", np.nan
+        surface, t, is_off = "", np.nan, False
         if code in CHANGES:
             if isinstance(curve, CycleCurve) and isinstance(state, Cycle):
                 motions, place = curve.shooting.motions, key[2][1]
@@ -871,11 +893,22 @@ class _Side:
             surfaces = motions.prepared.surfaces
             # Behind the surfaces are the levels of quantisers and the thresholds of relays.
             surface = surfaces[place] if 0 <= place < len(surfaces) else ""
+            is_off = bool(surface) and self._is_switched_off(motions)
         kind = f"{key[1]} vanishes" if code == "UZ" else CODES[code]
         params = {name: state.params[name]}
+        if is_off:
+            code = code if code == "BE" else "CO"
+            kind, params = f"{CODES[code].split(':')[0]}: the parameter switches the surface off", {name: 0.0}
         tangent = tuple(secant.tolist()) if code == "BP" and secant is not None else ()
         place = len(self.points) - 1
         self.special.append(Special(code, kind, surface, t, params, place, state, key, tangent))
+
+    def _is_switched_off(self, motions: Motions) -> bool:
+        """Whether the parameter is zero up to rounding, and a surface is no more there with zero."""
+        name, prepared = self.settings.name, motions.prepared
+        if abs(motions.params[name]) > _NOISE * self.settings.size or prepared.pinned is not None:
+            return False
+        return not prepared.is_valid_for(motions.n, {**motions.params, name: 0.0})
 
     def _change(self, key: Any, located: Step, beyond: Array) -> bool:
         """Continue with the itinerary that the flow takes behind a special point. False: the branch ends."""

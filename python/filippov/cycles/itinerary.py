@@ -170,6 +170,12 @@ class Itinerary(NamedTuple):
             return False
         return any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
 
+    def mode_at(self, t: float) -> Mode:
+        """Return the mode at a time, modulo the period."""
+        ends = np.cumsum(self.durations)
+        k = np.searchsorted(ends, (t - self.t0) % ends[-1], side="right")
+        return self.legs[min(int(k), len(self.legs) - 1)].mode
+
 
 def _later(leg: Leg, shift: float) -> Leg:
     """Return a leg that ends later by some time."""

@@ -9,8 +9,8 @@ References: di Bernardo et al. (2008), chapters 5, 7 and 8; Nordmark, J. Sound V
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,10 +53,14 @@ def beyond_change(
     def found_at(reach: float) -> tuple[Cycle, float, float] | None:
         w = located.w + reach * (beyond - located.w)
         new = flow_near(curve, w)
-        if new is None or new.itinerary.is_same(itinerary):
+        if new is None:
             return None
-        distance = distance_from(curve, w, new)
-        return new, distance, float(np.max(np.abs((w - located.w) / scale)))
+        places = _places_on(new, curve, w)
+        # The same modes may follow one another, each in the place of another one.
+        _, _, longest, mode = max(places)
+        if new.itinerary.is_same(itinerary) and new.itinerary.mode_at(longest) == mode:
+            return None
+        return new, _farthest(places), float(np.max(np.abs((w - located.w) / scale)))
 
     ends = [located.w[-1] + reach * (beyond[-1] - located.w[-1]) for reach in _REACHES]
     is_outside = [not bounds[0] <= end <= bounds[1] for end in ends]
@@ -116,24 +120,53 @@ def _middles(curve: CycleCurve, w: Array) -> list[tuple[float, float, Array, tup
 
 def distance_from(curve: CycleCurve, w: Array, cycle: Cycle) -> float:
     """Return how far a cycle is from a point of a curve, in the middles of its legs and by its size."""
+    return _farthest(_places_on(cycle, curve, w))
+
+
+class _PlaceOn(NamedTuple):
+    """The place on a cycle that is nearest to the middle of a leg of a curve.
+
+    Attributes
+    ----------
+    duration : float
+        Of the leg.
+    distance : float
+        By the size of the cycle.
+    t : float
+        The time on the cycle.
+    mode : tuple of int
+        That of the leg.
+    """
+
+    duration: float
+    distance: float
+    t: float
+    mode: tuple[int, ...]
+
+
+def _farthest(places: Sequence[_PlaceOn]) -> float:
+    """Return the largest distance, but for short legs."""
+    period = sum(place.duration for place in places)
+    return max((place.distance for place in places if place.duration >= SHORT * period), default=0.0)
+
+
+def _places_on(cycle: Cycle, curve: CycleCurve, w: Array) -> list[_PlaceOn]:
+    """Return the places on a cycle that are nearest to the middles of the legs at a point of a curve."""
     phases = np.arange(_PLACES) / _PLACES
     points = np.array([cycle.at(cycle.t0 + cycle.period * phase) for phase in phases])
     size = np.ptp(points, axis=0) + 1e-300
-    middles = _middles(curve, w)
-    period = sum(duration for duration, *_ in middles)
-    found = 0.0
-    for duration, t, x, _ in middles:
-        if duration < SHORT * period:
-            continue
+    found = []
+    for leg, (duration, t, x, _) in zip(curve.shooting.legs, _middles(curve, w), strict=True):
         if cycle.is_forced:
-            found = max(found, float(np.max(np.abs(cycle.at(t) - x) / size)))
+            distance = float(np.max(np.abs(cycle.at(t) - x) / size))
+            found.append(_PlaceOn(duration, distance, t, leg.mode))
             continue
         nearest, phase = _nearest(points, phases, x, size)
         for width in _WIDTHS:
             around = phase + width * _AROUND
             finer = np.array([cycle.at(cycle.t0 + cycle.period * (one % 1.0)) for one in around])
             nearest, phase = _nearest(finer, around, x, size)
-        found = max(found, nearest)
+        found.append(_PlaceOn(duration, nearest, cycle.t0 + cycle.period * (phase % 1.0), leg.mode))
     return found
 
 
