@@ -701,3 +701,37 @@ def test_a_zero_at_the_cut_of_an_angle_moves_with_the_cut() -> None:
     x = sol.y[0, -1]
     assert x < 0
     np.testing.assert_allclose(sol.dt_events[0], [[0.1 / -x]], rtol=1e-7)
+
+
+# Each vanishes where a factor does, or at an end of its range. Beside such a zero its values are rounding on
+# both sides of a surface.
+FACTORS: dict[str, Callable[[float, Any, float], Any]] = {
+    "limited below": lambda t, x, p: np.clip(x[0] + p, -1.0, 1.0) * x[1],
+    "not limited there": lambda t, x, p: np.clip(x[0] + p, -2.0, 1.0) * (x[1] + p / 10),
+    "limited by the parameter": lambda t, x, p: np.clip(x[0], -p, p) - p / 2,
+    "condition on the parameter": lambda t, x, p: x[0] - p if p > 0.2 else x[1],
+}
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_times_of_zeros_of_products_and_limits(name: str) -> None:
+    system = fl.System(lambda t, x, p=0.1: [x[1], -x[0]], n=2)
+    event, h = FACTORS[name], 1e-5
+
+    def times(p: float) -> Any:
+        return system.solve((0, 6), [1.7, 0.3], p=p, events=event, rtol=1e-12, atol=1e-13).t_events[0]
+
+    sol = system.solve((0, 6), [1.7, 0.3], p=0.37, events=event, wrt=["p"], rtol=1e-10)
+    differences = (times(0.37 + h) - times(0.37 - h)) / (2 * h)
+    assert len(differences) >= 2
+    np.testing.assert_allclose(sol.dt_events[0][:, 0], differences, rtol=1e-6, atol=1e-7)
+
+
+def test_a_cost_with_a_condition_on_a_parameter_has_the_gradient_of_its_branch() -> None:
+    system = fl.System(lambda t, x, p=0.1: [-p * x[0]], n=1)
+    cost = lambda t, x, p: x[0] if p > 0.2 else x[0] ** 2  # noqa: E731
+    for p, exact in ((0.3, -np.exp(-0.3)), (0.1, -2.0 * np.exp(-0.2))):
+        _, found = fl.gradient(system, (0, 1), [1.0], {"p": p}, terminal=cost, wrt=["p"])
+        assert found["p"] == pytest.approx(exact, abs=1e-8)
+    with pytest.raises(fl.InputError, match="terminal: its derivative is not known: it has a condition"):
+        fl.gradient(system, (0, 1), [1.0], {"p": 0.2}, terminal=cost, wrt=["p"])

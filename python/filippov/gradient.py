@@ -247,7 +247,9 @@ def _number(returned: Any, name: str) -> float:
 
 
 def _refuse_untraced(running: Cost, trace: Trace | None, values: Mapping[str, float]) -> None:
-    found = None if trace is None else trace_output(trace, selective(running, dict(values)))
+    found = (
+        None if trace is None else trace_output(trace, selective(running, dict(values)), parameters=values)
+    )
     if isinstance(found, str):
         raise InputError(f"running: its derivative is not known: {found}")
 
@@ -449,7 +451,7 @@ class _Sum:
                 "a file, does not have"
             )
         own = selective(function, dict(self._values))
-        found = known or trace_output(trace, own)
+        found = known or trace_output(trace, own, parameters=self._values)
         self._traced[function] = found
         if isinstance(found, str) and known_time is not None:
 
@@ -457,7 +459,7 @@ class _Sum:
             def at_time(t: Any, y: Any, **params: Any) -> Any:
                 return own(known_time, y, **params)
 
-            there = trace_output(trace, at_time)
+            there = trace_output(trace, at_time, parameters=self._values)
             if isinstance(there, TracedSystem):
                 return there
         if isinstance(found, str):

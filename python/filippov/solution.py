@@ -421,7 +421,8 @@ class Solution:
     def dt_events(self) -> list[Array]:
         """Derivatives of the times of every event by the columns of `wrt`, each of shape (k, len(wrt)).
 
-        NaN for an event that is called and not traced. It is a `ModelError` to ask for them of a run without
+        NaN for an event that is called and not traced, and for one with a staircase, as ``%`` and `np.floor`,
+        that the right-hand side does not have. It is a `ModelError` to ask for them of a run without
         ``wrt=``.
         """
         if not self.wrt or not isinstance(self._run, Run):
@@ -431,8 +432,9 @@ class Solution:
         assert origin.prepared.trace is not None
         found = []
         for spec, times in zip(origin.events, self._run.t_events, strict=True):
-            g = selective(spec.g, origin.values or {})
-            function = trace_output(origin.prepared.trace, g, origin.args)
+            values = origin.values or {}
+            g = selective(spec.g, values)
+            function = trace_output(origin.prepared.trace, g, origin.args, parameters=values)
             rows = [] if isinstance(function, str) else self._run.zero_derivatives(function, times)
             unknown = np.full((len(times), len(self.wrt)), np.nan)
             found.append(np.array(rows) if len(rows) else unknown)

@@ -313,20 +313,18 @@ def trace_output(
     g: Callable[..., Any],
     args: tuple[Any, ...] = (),
     *,
-    t0: float | None = None,
-    y0: NDArray[Any] | None = None,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float],
 ) -> TracedSystem | str:
-    """Turn a function into an expression beside an existing trace, as `trace_event` does, for all parameters.
+    """Turn a function into an expression beside an existing trace, as `trace_event` does, near these values.
 
-    It is returned in a form that can be written as bytes: the first component of the field of a system.
+    It is returned as the first component of the field of a system, which has the derivatives of the function.
     """
-    found = _beside(traced, g, args, t0, y0, parameters)
+    found = _beside(traced, g, args, None, None, parameters)
     if isinstance(found, str):
         return found
     _, tracer, node = found
-    if tracer.guards:
-        return "it has a condition on parameters"
+    if any(guard.sign == 0.0 for guard in tracer.guards.values()):
+        return "it has a condition on parameters that values beside these decide differently"
     return _as_component(tracer, node)
 
 
@@ -339,9 +337,9 @@ def trace_for_rows(
     y0: NDArray[Any],
     parameters: Mapping[str, float],
 ) -> tuple[TracedSystem, TracedEvent] | str:
-    """Return what `trace_output` returns, and the event that knows for which parameters it holds.
+    """Return a function as `trace_output` does, and the event that knows for which parameters it holds.
 
-    A function with a condition on parameters is traced too, for those that decide it as these do.
+    The first can be written as bytes. A condition on parameters is decided as for these.
     """
     found = _beside(traced, g, args, t0, y0, parameters)
     if isinstance(found, str):

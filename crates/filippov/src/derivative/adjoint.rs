@@ -591,8 +591,7 @@ impl<'w> Walk<'w> {
         add(&mut self.w, 1.0, &gradient);
         if let Some(function) = zero {
             let field = piece.rates(t, &z)?;
-            let (time, normal) = function.at_zero(t, &z, &piece.q)?;
-            let rate = time + dot(&normal, &field);
+            let (rate, normal) = function.at_zero((t, &z), &piece.q, &field)?;
             let moved = by_time + dot(&gradient[..extended.n], &field);
             add(&mut self.w, -moved / rate, &normal);
         }

@@ -8,7 +8,6 @@ use crate::error::{Error, FieldError};
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
-use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
 
 /// A run with its derivatives.
@@ -79,8 +78,7 @@ impl<'r> Differentiated<'r> {
         path(t, &mut x)?;
         let z = extended.state(&x);
         let field = piece.rates(t, &z)?;
-        let (time, gradient) = function.at_zero(t, &z, &piece.q)?;
-        let rate = time + dot(&gradient, &field);
+        let (rate, gradient) = function.at_zero((t, &z), &piece.q, &field)?;
         let shift = |column: &Vec<f64>| -dot(&gradient, column) / rate;
         Ok(Some(columns.iter().map(shift).collect()))
     }
@@ -261,41 +259,56 @@ impl EventGradient {
         Ok((slopes.time()[0], gradient))
     }
 
-    /// The same of what fixes the time of a zero at a point. That is the function itself, or, if it jumps through zero, the
-    /// function inside of it that vanishes there.
+    /// How fast what fixes the time of a zero changes along a motion with these rates, and its derivatives by the extended state. That is
+    /// the function itself, or, if it jumps through zero, the function inside of it that vanishes there.
     pub(super) fn at_zero(
         &self,
-        t: f64,
-        z: &[f64],
+        (t, z): (f64, &[f64]),
         q: &[f64],
+        rates: &[f64],
     ) -> Result<(f64, Vec<f64>), FieldError> {
         let system = &self.extended;
+        let (time, gradient) = self.at(t, z, q)?;
+        let rate = time + dot(&gradient, rates);
         let signs = sides_of(system, (t, z), q)?;
-        let here = Setting::new(&signs, q).at(t, z);
         let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(&here, &mut h)?;
-        let mut value = vec![0.0; z.len()];
-        let mut jump: Option<usize> = None;
+        system.surfaces(&Setting::new(&signs, q).at(t, z), &mut h)?;
+        let mut field = vec![0.0; z.len()];
+        let mut value_with = |signs: &[f64]| -> Result<f64, FieldError> {
+            system.field(&Setting::new(signs, q).at(t, z), &mut field)?;
+            Ok(field[0])
+        };
+        let value = value_with(&signs)?;
+        // Beside a zero of a factor all values are rounding: what is nearest to its zero, in time, fixes it.
+        let mut found = (time_to_zero(value, rate), rate, gradient);
         for j in 0..h.len() {
-            let mut sides = [0.0; 2];
-            for (side, found) in [-1.0, 1.0].into_iter().zip(&mut sides) {
-                let mut signs = signs.clone();
-                signs[j] = side;
-                system.field(&Setting::new(&signs, q).at(t, z), &mut value)?;
-                *found = value[0];
+            let mut across = signs.clone();
+            across[j] = -signs[j];
+            if value * value_with(&across)? >= 0.0 {
+                continue;
             }
-            let [least, most] = [f64::min, f64::max].map(|f| f(sides[0].abs(), sides[1].abs()));
-            let jumps = sides[0] * sides[1] < 0.0 && least > AT_SIDE * most;
-            // Of several the one that vanishes.
-            if jumps && jump.is_none_or(|known| h[j].abs() < h[known].abs()) {
-                jump = Some(j);
-            }
-        }
-        if let Some(j) = jump {
             let mut gradient = vec![0.0; z.len()];
-            let time = system.gradient(j, &here, &mut gradient)?;
-            return Ok((time, gradient));
+            let here = Setting::new(&signs, q).at(t, z);
+            let rate = system.gradient(j, &here, &mut gradient)? + dot(&gradient, rates);
+            let away = time_to_zero(h[j], rate);
+            if away < found.0 {
+                found = (away, rate, gradient);
+            }
         }
-        self.at(t, z, q)
+        Ok((found.1, found.2))
+    }
+}
+
+/// How long a value takes to its zero at this rate; infinitely long if nothing is known of it.
+fn time_to_zero(value: f64, rate: f64) -> f64 {
+    let time = if value == 0.0 {
+        0.0
+    } else {
+        (value / rate).abs()
+    };
+    if time.is_nan() {
+        f64::INFINITY
+    } else {
+        time
     }
 }
