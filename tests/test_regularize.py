@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -211,3 +212,22 @@ def test_static_friction_has_no_smooth_twin() -> None:
     system = fl.System(lambda t, x: [x[1], -x[0] - friction(t, x)], n=2)
     with pytest.raises(fl.ModelError, match="static friction above kinetic has no smooth twin"):
         system.regularize(1e-3)
+
+
+def test_a_twin_follows_the_conditions_on_parameters_of_its_system() -> None:
+    def block(t: Any, x: Any, p: float = 0.5) -> Any:
+        return [x[1], -x[0] - 0.3 * np.sign(x[1]) + (1.0 if p > 0.2 else 0.0) + 0.2 * (p * x[0] > 0)]
+
+    system = fl.System(block, n=2)
+    smooth = system.regularize(1e-4)
+    for p in (0.5, 0.1, 0.0, 0.5):
+        exact = system.solve((0, 1), [1.0, 0.2], p=p).y[:, -1]
+        assert smooth.solve((0, 1), [1.0, 0.2], p=p).y[:, -1] == pytest.approx(exact, abs=1e-3)
+    for eps in (0.0, -0.1):
+        with pytest.raises(fl.InputError, match="eps: a positive"):
+            smooth.solve((0, 1), [1.0, 0.2], eps=eps)
+    copy = pickle.loads(pickle.dumps(smooth))
+    exact = smooth.solve((0, 1), [1.0, 0.2]).y[:, -1]
+    assert copy.solve((0, 1), [1.0, 0.2]).y[:, -1] == pytest.approx(exact, abs=1e-12)
+    with pytest.raises(fl.ModelError, match="valid for"):
+        copy.solve((0, 1), [1.0, 0.2], p=0.1)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from filippov._core import TracedSystem
 from filippov.errors import InputError, ModelError
@@ -13,9 +14,51 @@ from filippov.prepare import Prepared
 from filippov.scalars import positive
 from filippov.sliding_policy import SlidingPolicy, fit_kappa, kappa_of
 
-__all__ = ["regularized"]
+if TYPE_CHECKING:
+    from filippov.system import System
+
+__all__ = ["Twin", "regularized"]
+
+Array = npt.NDArray[np.float64]
+# The parameter that is the width of the layers.
+WIDTH = "eps"
 
 _KINDS = ("tanh", "linear")
+
+
+class Twin:
+    """How a system is regularised, for whatever values of its parameters.
+
+    Parameters
+    ----------
+    system : System
+        The piecewise-smooth system, which has no parameter ``"eps"``.
+    kind, kappa
+        As in `regularized`.
+    """
+
+    def __init__(self, system: System, kind: Any, kappa: Any) -> None:
+        self._system, self._kind, self._kappa = system, kind, kappa
+        self._latest: tuple[Prepared, Prepared] | None = None  # a form of the system, and that of the twin
+
+    def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:
+        """Return the twin for these values, as `System.prepare` does.
+
+        Raises
+        ------
+        InputError
+            If `kind`, `kappa` or the width is wrong.
+        ModelError
+            As for `regularized`.
+        """
+        width = positive(WIDTH, values[WIDTH])
+        own = self._system.prepare(n, t0, y0, {name: v for name, v in values.items() if name != WIDTH})
+        latest = self._latest  # read once: another thread may ask for other values meanwhile
+        twin = latest[1] if latest is not None and latest[0] is own else None
+        if twin is None:
+            twin = regularized(own, WIDTH, self._kind, self._kappa)
+            self._latest = own, twin
+        return twin if own.pinned is None else twin._replace(pinned={**own.pinned, WIDTH: width})
 
 
 def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared:

@@ -23,6 +23,8 @@ from filippov.resets import CoreAction
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+    from filippov.regularized import Twin
+
 __all__ = ["Loaded", "Saving", "packed", "unpacked"]
 
 
@@ -48,6 +50,7 @@ class Saving(ABC):
     """Systems that can be saved, sent and copied."""
 
     _source: Source | None
+    _twin: Twin | None
     _params: dict[str, float]
     _states: tuple[str, ...] | None
     _n: int | None
@@ -192,7 +195,7 @@ class Saving(ABC):
     ) -> None:
         self._prepared, self._states, self._params = prepared, states, params
         self._n = prepared.core.n_states
-        self._source, self._calls, self._outputs = None, {}, {}
+        self._source, self._twin, self._calls, self._outputs = None, None, {}, {}
         core = prepared.core
         self._discrete = tuple(core.discrete()) if isinstance(core, TracedSystem) else ()
 
@@ -203,7 +206,7 @@ class Saving(ABC):
         prepared = self._prepared
         state["_prepared"], state["_calls"] = None, {}
         if prepared is not None and isinstance(prepared.core, TracedSystem):
-            for name in ("_prepared", "_calls", "_source", "_params", "_states", "_n"):
+            for name in ("_prepared", "_calls", "_source", "_twin", "_params", "_states", "_n"):
                 state.pop(name)
             state["_packed"] = packed(prepared, self._params)
         state["_outputs"] = _that_travel(self._outputs)

@@ -31,6 +31,7 @@ from filippov.unknown import did_you_mean
 
 if TYPE_CHECKING:
     from filippov.ensemble import Ensemble
+    from filippov.regularized import Twin
 
 __all__ = ["System"]
 
@@ -266,6 +267,7 @@ class System(Points, Saving):
         self._n = check_n(n)
         self._discrete = source.discrete
         self._prepared: Prepared | None = None
+        self._twin: Twin | None = None
         self._outputs: dict[str, Callable[..., Any]] = {}
         self._calls: dict[Any, Any] = {}  # what earlier calls of `solve` need again, by their options
         if self._states is not None:
@@ -406,7 +408,7 @@ class System(Points, Saving):
         -------
         System
             A system with the same states and the same parameters. It has no outputs. Where the function
-            branches on values of parameters, it holds for the default values alone.
+            branches on values of parameters, a copy in another process holds for the default values alone.
 
         Raises
         ------
@@ -442,17 +444,14 @@ class System(Points, Saving):
         >>> bool(abs(sol.y[0, -1] - 1e-2 * np.arctanh(0.5)) < 1e-6)
         True
         """
-        from filippov.regularized import regularized
+        from filippov.regularized import WIDTH, Twin
 
-        width = positive("eps", eps)
-        if "eps" in self._params:
+        if WIDTH in self._params:
             raise InputError("eps: the system has a parameter of this name; rename it")
-        prepared = self.prepare(self._known_n(), 0.0, None, self.parameter_values(None))
-        twin = regularized(prepared, "eps", kind, kappa)
-        params = {**self._params, "eps": width}
-        if prepared.pinned is not None:
-            twin = twin._replace(pinned={**prepared.pinned, "eps": width})
-        return type(self)._of_core(twin, self._states, params)
+        twin, params = Twin(self, kind, kappa), {**self._params, WIDTH: positive("eps", eps)}
+        new = type(self)._of_core(twin.prepare(self._known_n(), 0.0, None, params), self._states, params)
+        new._twin = twin
+        return new
 
     @classmethod
     def _of_core(cls, prepared: Prepared, states: tuple[str, ...] | None, params: dict[str, float]) -> System:
@@ -552,6 +551,8 @@ class System(Points, Saving):
         """
         if self._n is not None and n != self._n:
             raise InputError(f"y0: the system has {self._n} states, y0 has {n}")
+        if self._twin is not None:
+            return self._twin.prepare(n, t0, y0, values)
         known = self._prepared  # read once: another thread may trace for other values meanwhile
         if known is not None and known.is_valid_for(n, values):
             warn_user(known.doubts)

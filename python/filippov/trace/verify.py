@@ -185,7 +185,8 @@ def _disagreement(
         f"{role} differs from its traced expression: {own[component]:.16g} by the function, "
         f"{traced[component]:.16g} by the expression, {where}. It uses something that tracing cannot see: a "
         "random number, a global or a stored value that changed between the calls, a test of the type of its "
-        "arguments, or the sign of a zero, which decides between pi and -pi in np.arctan2(0 * y, x); or the "
-        "motion stays where it has a value of its own, as sign(x**2) has at x = 0.\n"
+        "arguments, a comparison that rounding decides, as x * 0.1 * 3 > x * 0.3, or the sign of a zero, "
+        "which decides between pi and -pi in np.arctan2(0 * y, x); or the motion stays where it has a value "
+        "of its own, as sign(x**2) has at x = 0.\n"
         f"What to do:\n  - compute the result from t, x and the arguments alone\n  - {BLACK_BOX}"
     )
