@@ -735,3 +735,59 @@ def test_a_cost_with_a_condition_on_a_parameter_has_the_gradient_of_its_branch()
         assert found["p"] == pytest.approx(exact, abs=1e-8)
     with pytest.raises(fl.InputError, match="terminal: its derivative is not known: it has a condition"):
         fl.gradient(system, (0, 1), [1.0], {"p": 0.2}, terminal=cost, wrt=["p"])
+
+
+# Staircases that the right-hand side does not have.
+STAIRCASES: dict[str, Callable[[float, Any, float], Any]] = {
+    "rest": lambda t, x, p: x[0] % 1.0 - p,
+    "level": lambda t, x, p: np.floor(3.0 * x[0]) - p,
+    "moved level": lambda t, x, p: np.round(x[0] + p) - 0.5,
+    "quotient": lambda t, x, p: x[0] // p - 1.5,
+    "sum": lambda t, x, p: 0.2 * np.floor(3.0 * x[0]) + x[1] - p,
+    "product": lambda t, x, p: (x[0] * x[1]) % (0.3 + p) - 0.2,
+    "of time": lambda t, x, p: (t + x[0]) % p - 0.1 * p,
+    "nested": lambda t, x, p: np.floor(np.floor(2.0 * x[0]) / 2.0 + x[1] + p) - 0.5,
+    "one side": lambda t, x, p: np.where(x[1] > 0, x[0] % 1.0, x[0] % 0.7) - p,
+}
+
+
+@pytest.mark.parametrize("name", STAIRCASES)
+@pytest.mark.parametrize("steps", [0.0, 0.1])
+def test_times_of_zeros_of_staircases(name: str, steps: float) -> None:
+    def field(t: Any, x: Any, p: float = 0.37) -> Any:
+        return [x[1], -x[0] + (0.1 * np.floor(3.0 * x[0]) + 0.05 * np.sign(x[1]) if steps else 0.0)]
+
+    system, event, h = fl.System(field, n=2), STAIRCASES[name], 1e-5
+
+    def solved(p: float, **options: Any) -> fl.Solution:
+        return system.solve((0, 6.1), [1.7, 0.3], p=p, events=event, rtol=1e-12, atol=1e-13, **options)
+
+    sol = solved(0.37, wrt=["p"])
+    found, times = sol.dt_events[0][:, 0], sol.t_events[0]
+    assert len(found) >= 1
+    differences = (solved(0.37 + h).t_events[0] - solved(0.37 - h).t_events[0]) / (2 * h)
+    np.testing.assert_allclose(found, differences, rtol=1e-5, atol=1e-7)
+    # The sum of the squares of the times is a cost, whose gradient is the same derivatives.
+    _, gradient = fl.gradient(
+        *(system, (0, 6.1), [1.7, 0.3], {"p": 0.37}),
+        instants=[(event, lambda t, y: t**2)],
+        wrt=["p"],
+        rtol=1e-12,
+        atol=1e-13,
+    )
+    assert gradient["p"] == pytest.approx(np.sum(2.0 * times * found), abs=1e-9)
+
+
+def test_costs_with_staircases_have_gradients() -> None:
+    # x = exp(-p t): x % 0.1 at t = 1, and t % 0.1 + floor(3 x) where x = 0.5.
+    system = fl.System(lambda t, x, p=0.9: [-p * x[0]], n=1)
+    value, found = fl.gradient(system, (0, 1), [1.0], terminal=lambda t, y: y[0] % 0.1, wrt=["p", "y0"])
+    assert value == pytest.approx(np.exp(-0.9) % 0.1, abs=1e-8)
+    assert found["p"] == pytest.approx(-np.exp(-0.9), abs=1e-8)
+    assert found["x[0]"] == pytest.approx(np.exp(-0.9), abs=1e-8)
+    half = fl.Event(lambda t, x: x[0] - 0.5, terminal=True)
+    cost = lambda t, y: t % 0.1 + np.floor(3.0 * y[0])  # noqa: E731
+    value, found = fl.gradient(system, (0, 2), [1.0], terminal=cost, events=half, wrt=["p"])
+    time = np.log(2.0) / 0.9
+    assert value == pytest.approx(time % 0.1 + 1.0, abs=1e-8)
+    assert found["p"] == pytest.approx(-time / 0.9, abs=1e-7)

@@ -381,8 +381,8 @@ class _Sum:
         first, last = self._t0, float(self._sol.t[-1])
         if not first <= t <= last:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
-        known = None if zero is None else self._trace(name, zero)
-        function = self._trace(name, cost, None if zero is not None else t)
+        known = None if zero is None else self._trace(name, zero, t)
+        function = self._trace(name, cost, t, stands=zero is None)
         self._terms.append((function, t, None, known))
         self._costs.append((name, cost))
 
@@ -391,8 +391,8 @@ class _Sum:
         t, y = self._sol.t[-1], self._sol.y[:, -1]
         held = self._run.discrete(np.array([t]), len(self._names), False)[:, 0] if self._names else ()
         self._at_end.append(self._value_of((name, cost), t, y, held))
-        known = None if zero is None else self._trace(name, zero)
-        function = self._trace(name, cost, None if zero is not None else float(t))
+        known = None if zero is None else self._trace(name, zero, float(t))
+        function = self._trace(name, cost, float(t), stands=zero is None)
         self._terms.append((function, None, None, known))
         self._costs.append((name, cost))
 
@@ -440,8 +440,13 @@ class _Sum:
             raise ModelError(text, partial=self._sol) from error
         return _number(returned, name)
 
-    def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
-        """Return a function as an expression. At a known time what it reads of the time is a number."""
+    def _trace(
+        self, name: str, function: Cost, t: float | None = None, *, stands: bool = False
+    ) -> TracedSystem:
+        """Return a function as an expression, near a time if that is known.
+
+        Where the time stands what the function reads of it is a number.
+        """
         if isinstance(known := self._traced.get(function), TracedSystem):
             return known
         trace = self._sol._origin.prepared.trace
@@ -453,15 +458,19 @@ class _Sum:
         own = selective(function, dict(self._values))
         found = known or trace_output(trace, own, parameters=self._values)
         self._traced[function] = found
-        if isinstance(found, str) and known_time is not None:
+        if isinstance(found, str) and stands:
 
             @calls_user
-            def at_time(t: Any, y: Any, **params: Any) -> Any:
-                return own(known_time, y, **params)
+            def at_time(_: Any, y: Any, **params: Any) -> Any:
+                return own(t, y, **params)
 
             there = trace_output(trace, at_time, parameters=self._values)
             if isinstance(there, TracedSystem):
                 return there
+        if isinstance(found, str) and t is not None:
+            near = self._sol.trace_near(own, t)
+            if isinstance(near, TracedSystem):
+                return near
         if isinstance(found, str):
             raise InputError(f"{name}: its derivative is not known: {found}")
         return found

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run
+from filippov._core import Run, TracedSystem
 from filippov.arrays import real_array
 from filippov.backward import ReversedRun
 from filippov.derivatives import Wanted
@@ -35,7 +35,7 @@ from filippov.switches import (
     import_xarray,
     symmetric,
 )
-from filippov.trace.tracer import trace_output
+from filippov.trace.tracer import trace_near_point, trace_output
 from filippov.unknown import did_you_mean, refuse_at_drawing
 
 if TYPE_CHECKING:
@@ -421,8 +421,7 @@ class Solution:
     def dt_events(self) -> list[Array]:
         """Derivatives of the times of every event by the columns of `wrt`, each of shape (k, len(wrt)).
 
-        NaN for an event that is called and not traced, and for one with a staircase, as ``%`` and `np.floor`,
-        that the right-hand side does not have. It is a `ModelError` to ask for them of a run without
+        NaN for an event that is called and not traced. It is a `ModelError` to ask for them of a run without
         ``wrt=``.
         """
         if not self.wrt or not isinstance(self._run, Run):
@@ -435,10 +434,31 @@ class Solution:
             values = origin.values or {}
             g = selective(spec.g, values)
             function = trace_output(origin.prepared.trace, g, origin.args, parameters=values)
-            rows = [] if isinstance(function, str) else self._run.zero_derivatives(function, times)
-            unknown = np.full((len(times), len(self.wrt)), np.nan)
-            found.append(np.array(rows) if len(rows) else unknown)
+            if not isinstance(function, str):
+                rows = self._run.zero_derivatives(function, times)
+            else:
+                rows = [self._derivative_of_zero(g, t) for t in times.tolist()]
+            found.append(np.reshape(rows, (len(times), len(self.wrt))))
         return found
+
+    def _derivative_of_zero(self, g: Callable[..., Any], t: float) -> Array:
+        """Return the derivative of the time of one zero of a function with floors; NaN if it is not known."""
+        assert isinstance(self._run, Run)
+        function = self.trace_near(g, t)
+        if isinstance(function, str):
+            return np.full(len(self.wrt), np.nan)
+        return self._run.zero_derivatives(function, np.array([t]))[0]
+
+    def trace_near(self, g: Callable[..., Any], t: float) -> TracedSystem | str:
+        """Return a function as an expression near the motion just before a time, or why there is none."""
+        origin = self._origin
+        assert isinstance(self._run, Run)
+        assert origin.prepared.trace is not None
+        n_laws, time = len(origin.prepared.trace.tracer.laws.names), np.array([t])
+        held = self._run.discrete(time, n_laws, True)[:, 0] if n_laws else np.zeros(0)
+        y = self._kept_function()(time, "left")[:, 0]
+        values = origin.values or {}
+        return trace_near_point(origin.prepared.trace, g, origin.args, t=t, y=y, held=held, parameters=values)
 
     def derivative(self, t: npt.ArrayLike | None = None, side: str = "right", order: int = 1) -> Array:
         """Return the derivative of the state by the start and parameters, as asked for with ``wrt=``.

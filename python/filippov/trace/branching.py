@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from filippov._core import Regions
+from filippov._core import Regions, TracedEvent
 from filippov.errors import TraceError
 from filippov.trace.array import TracedArray, apply_ufunc
 from filippov.trace.array_functions import apply_function
@@ -129,6 +129,8 @@ class Tracer:
         Laws whose discrete states the trace has read.
     own_levels : dict of int to None
         What an event takes floors of that the field has not.
+    held : ndarray of shape (n_laws,), or None
+        The discrete states, where such floors are those at the start.
     is_doubtful : bool
         Whether such a trace answered a question that depends on them without an answer.
     """
@@ -151,8 +153,10 @@ class Tracer:
         stand_ins: StandIns | None = None,
         may_slide: bool = True,
         tables_switch: bool = False,
+        held: NDArray[np.float64] | None = None,
     ) -> None:
         self.builder = builder
+        self.held = held
         self.tables_switch = tables_switch
         self.may_slide = may_slide
         self.t0 = t0
@@ -226,6 +230,12 @@ class Tracer:
     def names(self) -> list[str]:
         """Return the names of the parameters and of the discrete states behind them."""
         return [*self.parameters, *self.laws.names]
+
+    def value_at_start(self, node: int) -> float | None:
+        """Return the value of an expression at the start, None within rounding of a zero inside of it."""
+        held = np.zeros(len(self.laws.names)) if self.held is None else self.held
+        function = TracedEvent(self.builder, node, [], len(self.names()), False, [])
+        return function.value(self.t0, self.y0.tolist(), [*self.values.tolist(), *held.tolist()])
 
     def operand(self, value: Any) -> int | None:
         """Return the node of a number, traced or not; None if `value` is no number."""

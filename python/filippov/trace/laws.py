@@ -175,12 +175,26 @@ class Laws:
         builder = tracer.builder
         if builder.is_stepwise(node):
             raise NoSuchLaw("floor(...) of what changes by jumps, which the right-hand side does not have")
-        index = list(tracer.own_levels).index(node) if node in tracer.own_levels else len(tracer.own_levels)
-        tracer.own_levels[node] = None
-        even, odd = (builder.parameter(self.first + len(self.names) + 2 * index + k) for k in (0, 1))
+        even, odd = self._whole_numbers_beside(tracer, node)
         wave = builder.unary("sin", builder.binary("multiply", builder.constant(math.pi), node))
         surface, orientation = builder.switch(wave)
         return builder.select(surface, orientation, even, odd)
+
+    def _whole_numbers_beside(self, tracer: Tracer, node: int) -> tuple[int, int]:
+        """Return the nodes of the even and the odd whole number beside an expression."""
+        builder = tracer.builder
+        if tracer.held is None:
+            levels = tracer.own_levels
+            index = list(levels).index(node) if node in levels else len(levels)
+            levels[node] = None
+            first = self.first + len(self.names) + 2 * index
+            return builder.parameter(first), builder.parameter(first + 1)
+        value = tracer.value_at_start(node)
+        if value is None:
+            raise NoSuchLaw("floor(...) of what another function inside of it leaves open at this point")
+        nearest = round(value)
+        even, odd = sorted((nearest - 1, nearest), key=lambda number: number % 2)
+        return builder.constant(even), builder.constant(odd)
 
     def _above(self, tracer: Tracer, node: int, level: int) -> int:
         """Return what is positive where an expression is above the whole number of its level.
@@ -305,7 +319,7 @@ class Laws:
     def entries_in(self, tracer: Tracer, node: int) -> dict[int, list[tuple[int, int, NDArray[np.float64]]]]:
         """Return the lists that an expression reads, by place: node of the entry, first place, entries."""
         found: dict[int, list[tuple[int, int, NDArray[np.float64]]]] = {}
-        for index in self._read(tracer, node):
+        for index in self._laws_in(tracer, node):
             law = self._laws[index]
             if law.kind == "entry":
                 state = tracer.builder.parameter(self.first + index)
@@ -350,8 +364,7 @@ class Laws:
 
     def whole(self, tracer: Tracer, node: int) -> int:
         """Return an expression of whole numbers with the sign of one that stands still between jumps."""
-        known = [index for index in self._read(tracer, node) if index < len(self._values)]
-        is_real = any(self._values[index] == "real" for index in known)
+        is_real = any(self._values[index] == "real" for index in self._laws_in(tracer, node))
         return self.sign(tracer, node) if is_real else node
 
     def may_be_idle(self, tracer: Tracer) -> bool:
@@ -433,6 +446,10 @@ class Laws:
         """Return the indices of the discrete states in an expression, own levels behind all laws."""
         read = tracer.builder.parameters_read(node)
         return [index - self.first for index in read if index >= self.first]
+
+    def _laws_in(self, tracer: Tracer, node: int) -> list[int]:
+        """Return the laws whose discrete states are in an expression."""
+        return [index for index in self._read(tracer, node) if index < len(self._laws)]
 
     def _state(self, tracer: Tracer, law: _Law, name: str) -> int:
         index = self._known.get(law)

@@ -28,7 +28,15 @@ if TYPE_CHECKING:
     from filippov.trace.laws import Laws
     from filippov.trace.stand_ins import StandIns
 
-__all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_for_rows", "trace_output"]
+__all__ = [
+    "Trace",
+    "trace",
+    "trace_beside",
+    "trace_event",
+    "trace_for_rows",
+    "trace_near_point",
+    "trace_output",
+]
 
 # What a warning says of an event or a section with a law that the run does not follow.
 OWN_LAW = "it has a floor, a relay or a table that the run does not follow"
@@ -320,12 +328,26 @@ def trace_output(
     It is returned as the first component of the field of a system, which has the derivatives of the function.
     """
     found = _beside(traced, g, args, None, None, parameters)
-    if isinstance(found, str):
-        return found
-    _, tracer, node = found
-    if any(guard.sign == 0.0 for guard in tracer.guards.values()):
-        return "it has a condition on parameters that values beside these decide differently"
-    return _as_component(tracer, node)
+    return found if isinstance(found, str) else _with_derivatives(*found[1:])
+
+
+def trace_near_point(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t: float,
+    y: NDArray[np.float64],
+    held: NDArray[np.float64],
+    parameters: Mapping[str, float],
+) -> TracedSystem | str:
+    """Return what `trace_output` returns, near a point.
+
+    Floors that the field does not have are those there, on both sides of a whole number. The discrete states
+    are `held`.
+    """
+    found = _beside(traced, g, args, t, y, parameters, held=held)
+    return found if isinstance(found, str) else _with_derivatives(*found[1:])
 
 
 def trace_for_rows(
@@ -349,6 +371,13 @@ def trace_for_rows(
     return component if isinstance(component, str) else (component, event)
 
 
+def _with_derivatives(tracer: Tracer, node: int) -> TracedSystem | str:
+    """Return a system whose first component is this node, unless it has a border at these parameters."""
+    if any(guard.sign == 0.0 for guard in tracer.guards.values()):
+        return "it has a condition on parameters that values beside these decide differently"
+    return _as_component(tracer, node)
+
+
 def _as_component(tracer: Tracer, node: int) -> TracedSystem | str:
     """Return a system whose first component is this node."""
     if tracer.own_levels:
@@ -366,18 +395,19 @@ def _beside(
     parameters: Mapping[str, float] | None,
     *,
     is_event: bool = False,
+    held: NDArray[np.float64] | None = None,
 ) -> tuple[TracedEvent, Tracer, int] | str:
     """Trace a function beside a trace; the event, its tracer and its node, or what kept it from that.
 
     An event reads the discrete states that the run follows. Other functions are evaluated at points, where
-    those that the run does not follow are found anew.
+    those that the run does not follow are found anew; near one point, where the discrete states are `held`.
     """
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
 
     def attempt(stand_ins: StandIns | None) -> tuple[Tracer, int]:
         tracer = _tracer_beside(
-            own, traced.builder, traced.field, own.laws, stand_ins, t0=t0, y0=y0, parameters=values
+            own, traced.builder, traced.field, own.laws, stand_ins, t0=t0, y0=y0, parameters=values, held=held
         )
         return tracer, _explore(tracer, g, args, "event", None)[0]
 
@@ -390,7 +420,7 @@ def _beside(
         levels, is_pinned = list(tracer.own_levels), bool(tracer.guards)
         event = TracedEvent(builder, node, levels, len(tracer.names()), is_pinned, tracer.moving())
         keywords = _named(g, dict(values), "event")
-        if not own.laws.names:
+        if not own.laws.names and held is None:
             verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)
     except TraceError as error:
         return OWN_LAW if isinstance(error.__cause__, NoSuchLaw) else _why(error)
@@ -513,6 +543,7 @@ def _tracer_beside(
     t0: float | None = None,
     y0: NDArray[Any] | None = None,
     parameters: Mapping[str, float] | None = None,
+    held: NDArray[np.float64] | None = None,
 ) -> Tracer:
     """Return a tracer for a function beside a field, which adds nothing to the builder of the field."""
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
@@ -527,6 +558,7 @@ def _tracer_beside(
         constants=ConstantsOfMotion(builder, field),
         stand_ins=stand_ins,
         may_slide=False,
+        held=held,
     )
 
 
