@@ -223,3 +223,28 @@ def test_a_floor_of_a_floor_is_followed_beside_one_of_a_kink(method: str) -> Non
     sol = fl.solve_ivp(lambda t, x: [1.0], (0, 4), [0.2], method=method, events=event)
     expected = np.array([0.5 * (np.pi + np.arcsin(0.25)), 2.95]) - 0.2
     np.testing.assert_allclose(sol.t_events[0], expected, rtol=0, atol=1e-9)
+
+
+def relay_and_friction(t: Any, x: Any) -> Any:
+    relay = fl.hysteresis(x[0], -0.3, 0.4)
+    return [x[1], -x[0] - 0.2 * relay - 0.1 * np.sign(x[1]) + 0.3 * np.sin(t)]
+
+
+@pytest.mark.parametrize("digits", np.arange(5.0, 12.1, 0.5))
+def test_an_event_that_jumps_with_a_relay_is_found_at_every_tolerance(digits: float) -> None:
+    # The instant of the relay puts the state onto the threshold, by a rounding, which is no jump of it.
+    def event(t: Any, x: Any) -> Any:
+        return fl.hysteresis(x[0], -0.3, 0.4) * (x[1] + 0.2) + 0.1
+
+    rtol = 10.0**-digits
+    sol = fl.solve_ivp(relay_and_friction, (0, 12), [1.7, 0.3], events=event, rtol=rtol, atol=1e-2 * rtol)
+    # Seen from outside: the relay is the sign between its switches, and its times are those of the switches.
+    t = np.linspace(0, 12, 40_001)
+    y = sol.sol(t)
+    relay, values = 1.0, []
+    for x, v in y.T:
+        relay = 1.0 if x >= 0.4 else -1.0 if x <= -0.3 else relay
+        values.append(relay * (v + 0.2) + 0.1)
+    changes = t[:-1][np.diff(np.sign(values)) != 0]
+    assert len(sol.t_events[0]) == len(changes) >= 5
+    np.testing.assert_allclose(sol.t_events[0], changes, atol=12 / 40_000)

@@ -825,6 +825,10 @@ impl<'a> Integrator<'a> {
             observed.act(derivative, acts);
         }
         self.run.stats.n_events += done.len() as u64;
+        // A law moves no state, though the instant may put it onto a surface, by a rounding.
+        if done.iter().any(|act| act.y_before != act.y_after) {
+            self.recorder.user_events.forget_sides();
+        }
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));
         self.recorder.jump(t, &self.run.x);

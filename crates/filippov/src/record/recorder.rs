@@ -256,9 +256,6 @@ impl<'a> Recorder<'a> {
 
     /// The states before the first switch of this instant, which is `first`, and after the last one.
     pub fn set_jump(&mut self, first: usize, before: &[f64], after: &[f64]) {
-        if before != after {
-            self.user_events.forget_sides();
-        }
         if let Some(switch) = self.switches.latest_mut().get_mut(first) {
             switch.y_before = SmallVec::from_slice(before);
         }
