@@ -6,6 +6,7 @@ Reference: Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import filippov as fl
@@ -389,3 +390,166 @@ def test_events_and_resets_that_do_not_name_a_parameter(name: str) -> None:
         assert "reset" in sol.switches.kind
         ends.append(np.append(sol.y[:, -1], sol.derivative()))
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-10)
+
+
+def heater(t: Any, x: Any, P: float = 2.0, high: float = 1.0) -> Any:
+    return [P * (0.5 - fl.hysteresis(x[0], 0.0, high)) - 0.1]
+
+
+def test_a_cost_reads_the_relay_of_the_run() -> None:
+    # From 0.3 it heats by 2.9 until 1, at t = 0.241; at t = 0.5 the relay is +1, between its thresholds.
+    power = lambda t, y, P, high: P * fl.hysteresis(y[0], 0.0, high)  # noqa: E731
+    system = fl.System(heater, n=1)
+    for where in ({"terminal": power}, {"instants": [(0.5, power)]}):
+        value, found = fl.gradient(system, (0, 0.5), [0.3], **where, wrt=["P"])
+        assert (value, found["P"]) == pytest.approx((2.0, 1.0), abs=1e-12)
+
+
+def block(t: Any, x: Any, F: float = 1.0, k: float = 1.1, A: float = 0.7) -> Any:
+    return [x[1], A * np.sin(1.3 * t) - k * x[0] - F * np.sign(x[1])]
+
+
+@pytest.mark.parametrize("t_end", [1.6, 8.0])
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_a_cost_while_the_motion_sticks_reads_the_force_that_holds(t_end: float, is_terminal: bool) -> None:
+    force = lambda t, y, F, k, A: (F * np.sign(y[1]) - 0.1) ** 2 + y[0]  # noqa: E731
+    system = fl.System(block, n=2)
+    options: Any = {"rtol": 1e-11, "atol": 1e-13}
+
+    def value(**params: float) -> float:
+        sol = system.solve((0, t_end), [0.9, 0.0], **params, **options)
+        assert sol.mode_at(t_end).is_sliding
+        return float(sol.evaluate(force, t_end, side="left"))
+
+    where: Any = {"terminal": force} if is_terminal else {"instants": [(t_end, force)]}
+    wrt = ["F", "k", "A"]
+    found_value, found = fl.gradient(system, (0, t_end), [0.9, 0.0], **where, wrt=wrt, **options)
+    assert found_value == pytest.approx(value(), abs=1e-10)
+    base, h = {"F": 1.0, "k": 1.1, "A": 0.7}, 1e-5
+    for name in wrt:
+        more, less = (value(**{**base, name: base[name] + step}) for step in (h, -h))
+        assert found[name] == pytest.approx((more - less) / (2 * h), abs=1e-6)
+
+
+def test_a_cost_that_reads_the_sign_of_static_friction_is_refused_in_words() -> None:
+    def held(t: Any, x: Any, F: float = 1.0, r: float = 1.3) -> Any:
+        return [x[1], 0.8 * np.sin(t) - x[0] - F * fl.stick(x[1], r)]
+
+    system = fl.System(held, n=2)
+    cost = lambda t, y, F, r: F * fl.stick(y[1], r)  # noqa: E731
+    with pytest.warns(fl.FilippovWarning, match="reads signs of surfaces that the motion slides on"):
+        value, found = fl.gradient(system, (0, 8), [2.5, 0.0], terminal=cost, wrt=["F"])
+    assert value == pytest.approx(system.solve((0, 8), [2.5, 0.0]).evaluate(cost, 8.0), abs=1e-9)
+    assert np.isnan(found["F"])
+
+
+@pytest.mark.parametrize(("t_end", "total"), [(2.0, 1.0), (5.0, 0.0), (9.0, 1.0)])
+def test_a_cost_at_a_switch_has_the_sign_before(t_end: float, total: float) -> None:
+    system = fl.System(lambda t, x, F=0.3: [x[1], -x[0] - F * np.sign(x[1])], n=2)
+    cost = lambda t, y, F: F * np.sign(y[1])  # noqa: E731
+    for when in ("x[1]", lambda t, y: y[1]):
+        value, found = fl.gradient(system, (0, t_end), [1.5, 0.5], instants=[(when, cost)], wrt=["F"])
+        assert (value, found["F"]) == pytest.approx((0.3 * total, total), abs=1e-9)
+
+
+def test_the_deceleration_at_a_stop_is_that_before() -> None:
+    system = fl.System(lambda t, x, F=0.3: [x[1], -x[0] - F * np.sign(x[1])], n=2)
+    stop = fl.Event(lambda t, y: y[1], terminal=True)
+    cost = lambda t, y, F: -y[0] - F * np.sign(y[1])  # noqa: E731
+    value, found = fl.gradient(system, (0, 9), [1.5, 0.5], terminal=cost, events=stop, wrt=["F"])
+    # (x + F)^2 + v^2 is constant: x = sqrt(1.8^2 + 0.25) - F at the stop.
+    assert value == pytest.approx(-np.sqrt(1.8**2 + 0.25), abs=1e-8)
+    assert found["F"] == pytest.approx(-1.8 / np.sqrt(1.8**2 + 0.25), abs=1e-7)
+
+
+def counting(t: Any, x: Any, n: float, c: float = 1.0, a: float = 1.0) -> Any:
+    return [a]
+
+
+JUMPS: dict[str, tuple[fl.System, Any, list[float], float, tuple[str, ...]]] = {
+    "relay": (
+        fl.System(heater, n=1),
+        lambda t, x, P, high: P * fl.hysteresis(x[0], 0.0, high) + 0.2 * np.sin(0.1 * t),
+        [0.3],
+        3.0,
+        ("P", "high"),
+    ),
+    "relay of its own": (
+        fl.System(lambda t, x, c=0.2, r=0.4: [x[1], -x[0] + 0.0 * c], n=2),
+        lambda t, x, c, r: fl.hysteresis(x[0] + c, -0.3, r) * x[1] - c,
+        [1.7, 0.3],
+        6.0,
+        ("c", "r"),
+    ),
+    "clock": (
+        fl.System(lambda t, x, T=1.3, A=1.0: [A * fl.square(t, T, 0.4)], n=1),
+        lambda t, x, T, A: A * fl.square(t, T, 0.4) - 0.1 * x[0],
+        [0.1],
+        4.0,
+        ("T", "A"),
+    ),
+    "rest of the time": (
+        fl.System(lambda t, x, T=1.3, A=1.0: [A + 0.0 * T], n=1),
+        lambda t, x, T, A: t % T - 0.5,
+        [0.1],
+        4.0,
+        ("T", "A"),
+    ),
+    "counter": (
+        fl.System(
+            counting,
+            n=1,
+            resets=fl.Reset(lambda t, x, c: x[0] - c, set={"n": lambda t, x, n: n + 1}),
+            discrete={"n": 0.0},
+        ),
+        lambda t, x, n, c, a: 0.7 * x[0] - n,
+        [0.1],
+        1.2,
+        ("c", "a"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_a_zero_that_an_instant_brings_moves_with_that(name: str) -> None:
+    system, event, y0, t_end, wrt = JUMPS[name]
+    options: Any = {"rtol": 1e-11, "atol": 1e-13}
+    base = {key: system.params[key] for key in wrt}
+    sol = system.solve((0, t_end), y0, **base, events=event, wrt=list(wrt), **options)
+    found, h = sol.dt_events[0], 1e-5
+    assert len(found) >= 1
+    for k, key in enumerate(wrt):
+        more, less = (
+            system.solve((0, t_end), y0, **{**base, key: base[key] + step}, events=event, **options)
+            for step in (h, -h)
+        )
+        differences = (more.t_events[0] - less.t_events[0]) / (2 * h)
+        np.testing.assert_allclose(found[:, k], differences, rtol=1e-6, atol=1e-7)
+    _, gradient = fl.gradient(
+        *(system, (0, t_end), y0, base),
+        instants=[(event, lambda t, y: t)],
+        wrt=list(wrt),
+        **options,
+    )
+    assert [gradient[key] for key in wrt] == pytest.approx(found.sum(axis=0), abs=1e-9)
+    # The run may end with the last of them.
+    last = fl.Event(event, terminal=len(found))
+    _, gradient = fl.gradient(
+        *(system, (0, t_end), y0, base), terminal=lambda t, y: t, events=last, wrt=list(wrt), **options
+    )
+    assert [gradient[key] for key in wrt] == pytest.approx(found[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("wrt", "warns"), [(["T"], True), (["A"], False)])
+def test_a_cost_at_a_tick_is_one_sided_only_if_the_tick_moves(wrt: list[str], warns: bool) -> None:
+    system = fl.System(lambda t, x, A=1.0, T=1.0: [A * fl.square(t, T, 0.5)], n=1)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fl.gradient(system, (0, 3.2), [0.0], instants=[(1.0, lambda t, y: y[0])], wrt=wrt)
+    assert any("one side" in str(warning.message) for warning in caught) == warns
+
+
+def test_derivatives_at_no_times() -> None:
+    system = fl.System(heater, n=1)
+    sol = system.solve((0, 1), [0.3], wrt=["P", "y0"])
+    assert sol.derivative([]).shape == (1, 2, 0)

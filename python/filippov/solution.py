@@ -519,6 +519,9 @@ class Solution:
         flat = np.ascontiguousarray(np.atleast_1d(times))
         self._kept_function()._check_range(flat)
         left = side == "left"
+        if not len(flat):
+            rows = len(self.states) + len(self._origin.system.discrete)
+            return np.empty((rows, *[len(self.wrt)] * order, 0))
         if order == 2:
             pairs = self._run.second_derivatives(flat, left)
             forms = [symmetric(at_one, len(self.wrt)) for at_one in pairs]

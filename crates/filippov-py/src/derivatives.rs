@@ -195,7 +195,7 @@ type GradientRow = (
     Vec<f64>,
     Option<LostAt>,
     BordersRow,
-    Vec<(usize, f64, Vec<f64>)>,
+    Vec<(usize, f64, Vec<f64>, f64)>,
 );
 
 /// What a run computed, and its actions.
@@ -370,7 +370,9 @@ impl RunDerivatives {
         };
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
         let points = found.points.into_iter();
-        let points = points.map(|point| (point.term, point.t, point.x)).collect();
+        let points = points
+            .map(|point| (point.term, point.t, point.x, point.value))
+            .collect();
         Ok((entries, found.lost, borders_row(&found.borders), points))
     }
 

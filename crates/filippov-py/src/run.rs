@@ -45,7 +45,7 @@ type GradientRow<'py> = (
     Vector<'py>,
     Option<LostAt>,
     BordersRow,
-    Vec<(usize, f64, Vector<'py>)>,
+    Vec<(usize, f64, Vector<'py>, f64)>,
 );
 
 type DecisionRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>);
@@ -607,7 +607,7 @@ impl Run {
         let of = (&self.prepared, &terms[..]);
         let (entries, lost, borders, points) = derivatives.gradient(py, system, run, of)?;
         let points = points.into_iter();
-        let points = points.map(|(term, t, x)| (term, t, PyArray1::from_vec(py, x)));
+        let points = points.map(|(term, t, x, value)| (term, t, PyArray1::from_vec(py, x), value));
         Ok((
             PyArray1::from_vec(py, entries),
             lost,

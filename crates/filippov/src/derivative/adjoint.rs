@@ -7,12 +7,13 @@
 
 use std::cell::RefCell;
 
-use super::between::{state_at, EventGradient};
+use super::between::state_at;
 use super::borders::{
     differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
     surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
+use super::event_gradient::EventGradient;
 use super::extended::{Column, Extended};
 use super::forms::add;
 use super::instant::{arrival, brought_by, Instant, Lost, Passage, Weights};
@@ -174,6 +175,9 @@ impl Observer for &RefCell<Trail> {
     }
 }
 
+/// Why a term has no gradient.
+const READS_MULTIPLIERS: &str = "the cost reads signs of surfaces that the motion slides on";
+
 /// A term of a cost: a function of time, state and parameters at one or more instants.
 pub struct Term<'c> {
     /// The function.
@@ -218,6 +222,8 @@ pub struct TermPoint {
     pub t: f64,
     /// The state, the named discrete states behind it.
     pub x: Vec<f64>,
+    /// The value of the term; NaN if it is not known.
+    pub value: f64,
 }
 
 impl CostGradient {
@@ -272,6 +278,10 @@ pub struct Walk<'w> {
     owed: Vec<Shares>,
     borders: Borders,
     points: Vec<TermPoint>,
+    /// The time of the instant that was passed last, and its derivative by the state before it.
+    behind: Option<(f64, Row)>,
+    /// What the time of the last instant of the run adds, if the run ends with that.
+    ends_with: f64,
     /// From where on there is no derivative.
     lost: Option<(f64, &'static str)>,
 }
@@ -366,6 +376,8 @@ impl<'w> Walk<'w> {
             owed: Vec::new(),
             borders: Borders::default(),
             points: Vec::new(),
+            behind: None,
+            ends_with: 0.0,
             lost: None,
         }
     }
@@ -456,7 +468,7 @@ impl<'w> Walk<'w> {
                 break;
             };
             let mut before = Piece::new(around(earlier), record.mode[0], record.discrete[0]);
-            self.note_points(&record);
+            self.note_points(&record, &mut before)?;
             if self.lost.is_none() {
                 let both = (&mut before, &mut piece);
                 let lost = self.pass((trail, earlier), &record, around(earlier), both)?;
@@ -485,20 +497,28 @@ impl<'w> Walk<'w> {
         self.t_last = stretch.solution.t_last;
         self.x_last = x.to_vec();
         let end = (self.t_last, &x[..]);
-        for term in self.terms {
+        for (place, term) in self.terms.iter().enumerate() {
             if let When::End(zero) = term.at {
-                self.add_term(&mut piece, (term.cost, zero), end)?;
+                self.add_term(&mut piece, (place, zero), end, last)?;
             }
         }
         Ok(piece)
     }
 
-    /// Notes down where terms of a surface count, if this instant is brought about by one.
-    fn note_points(&mut self, record: &InstantRecord) {
+    /// Notes down where terms of a surface count, if this instant is brought about by one; `before` is the motion before.
+    fn note_points(
+        &mut self,
+        record: &InstantRecord,
+        before: &mut Piece,
+    ) -> Result<(), FieldError> {
+        let z = self.run.systems.1.state(record.x[0]);
         for (term, _) in self.at_surfaces(record) {
             let (t, x) = (record.t[0], record.x[0].to_vec());
-            self.points.push(TermPoint { term, t, x });
+            let slopes = self.terms[term].cost.on(before, (t, &z))?;
+            let value = slopes.map_or(f64::NAN, |slopes| slopes.value);
+            self.points.push(TermPoint { term, t, x, value });
         }
+        Ok(())
     }
 
     /// The surroundings of the pieces, in order.
@@ -570,30 +590,49 @@ impl<'w> Walk<'w> {
                 When::Zero(_, function) => Some(function),
                 _ => None,
             };
-            if self.lost.is_none() {
-                self.add_term(piece, (term.cost, zero), (t, &x))?;
-            }
-            self.points.push(TermPoint { term: place, t, x });
+            self.add_term(piece, (place, zero), (t, &x), None)?;
         }
         Ok(())
     }
 
-    /// Adds a function at a point, and at the zero of another one if that is given.
+    /// Adds a term at a point, and at the zero of a function if that is given; `before` is the instant at which the motion began.
     fn add_term(
         &mut self,
         piece: &mut Piece,
-        (cost, zero): (&EventGradient, Option<&EventGradient>),
+        (place, zero): (usize, Option<&EventGradient>),
         (t, x): (f64, &[f64]),
+        before: Option<InstantRecord>,
     ) -> Result<(), FieldError> {
         let extended = self.run.systems.1;
         let z = extended.state(x);
-        let (by_time, gradient) = cost.at(t, &z, &piece.q)?;
-        add(&mut self.w, 1.0, &gradient);
-        if let Some(function) = zero {
-            let field = piece.rates(t, &z)?;
-            let (rate, normal) = function.at_zero((t, &z), &piece.q, &field)?;
-            let moved = by_time + dot(&gradient[..extended.n], &field);
-            add(&mut self.w, -moved / rate, &normal);
+        let slopes = self.terms[place].cost.on(piece, (t, &z))?;
+        self.points.push(TermPoint {
+            term: place,
+            t,
+            x: x.to_vec(),
+            value: slopes.as_ref().map_or(f64::NAN, |slopes| slopes.value),
+        });
+        if self.lost.is_some() {
+            return Ok(());
+        }
+        let Some(slopes) = slopes else {
+            self.lost = Some((t, READS_MULTIPLIERS));
+            return Ok(());
+        };
+        add(&mut self.w, 1.0, &slopes.gradient);
+        let Some(function) = zero else {
+            return Ok(());
+        };
+        let field = piece.rates(t, &z)?;
+        let moved = slopes.time + dot(&slopes.gradient[..extended.n], &field);
+        let zero = function.at_zero(piece, (t, &z))?;
+        match &self.behind {
+            // Where the function jumps with an instant of the run, it is zero when that comes.
+            Some((instant, by)) if zero.is_brought_by(*instant) => add(&mut self.w, moved, by),
+            _ if before.is_some_and(|instant| zero.is_brought_by(instant.t[0])) => {
+                self.ends_with += moved;
+            }
+            _ => add(&mut self.w, -moved / zero.rate, &zero.gradient),
         }
         Ok(())
     }
@@ -651,6 +690,7 @@ impl<'w> Walk<'w> {
             self.w[..n].fill(0.0);
             self.owed.extend(shares);
         }
+        add(&mut self.w, std::mem::take(&mut self.ends_with), &time);
         for owed in std::mem::take(&mut self.owed) {
             if owed.instant != trail.n_forgotten + place {
                 self.owed.push(owed);
@@ -663,14 +703,17 @@ impl<'w> Walk<'w> {
         for (place, guard) in self.at_surfaces(record) {
             let z = extended.state(record.x[0]);
             let cost = self.terms[place].cost;
-            let (by_time, gradient) = cost.at(record.t[0], &z, record.discrete[0])?;
-            add(&mut self.w, 1.0, &gradient);
-            let moved = by_time + dot(&gradient[..n], record.field[0]);
+            let Some(slopes) = cost.on(instant.before, (record.t[0], &z))? else {
+                return Ok(Some(READS_MULTIPLIERS));
+            };
+            add(&mut self.w, 1.0, &slopes.gradient);
+            let moved = slopes.time + dot(&slopes.gradient[..n], record.field[0]);
             match guard {
                 0 => add(&mut self.w, moved, &time),
                 _ => add(&mut self.w, moved, &instant.time_of(record.guards[guard])?),
             }
         }
+        self.behind = Some((record.t[0], time));
         let is_finite = self.w.iter().all(|value| value.is_finite());
         Ok((!is_finite).then_some("not_finite"))
     }

@@ -1,13 +1,14 @@
 //! The derivatives of a run at any of its times, and of the zeros of functions along it.
 
-use super::extended::{extended_system, Column, Extended};
+use super::event_gradient::EventGradient;
+use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
-use crate::error::{Error, FieldError};
+use crate::error::FieldError;
 use crate::options::Options;
 use crate::record::{Side, Solution};
-use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
+use crate::system::{Actions, TracedSystem};
 use crate::vectors::dot;
 
 /// A run with its derivatives.
@@ -77,9 +78,14 @@ impl<'r> Differentiated<'r> {
         let mut x = vec![0.0; extended.n];
         path(t, &mut x)?;
         let z = extended.state(&x);
-        let field = piece.rates(t, &z)?;
-        let (rate, gradient) = function.at_zero((t, &z), &piece.q, &field)?;
-        let shift = |column: &Vec<f64>| -dot(&gradient, column) / rate;
+        let zero = function.at_zero(piece, (t, &z))?;
+        // Where the function jumps with an instant of the run, it is zero when that comes.
+        let mut instants = self.run.found.instants.iter();
+        let instant = instants.find(|instant| zero.is_brought_by(instant.t));
+        if let Some(instant) = instant {
+            return Ok(Some(instant.dt.clone()));
+        }
+        let shift = |column: &Vec<f64>| -dot(&zero.gradient, column) / zero.rate;
         Ok(Some(columns.iter().map(shift).collect()))
     }
 
@@ -219,96 +225,4 @@ pub(super) fn state_at(
         x.fill(f64::NAN);
     }
     Ok(())
-}
-
-/// The gradient of a function by time, states and parameters.
-pub struct EventGradient {
-    /// A system whose first component is the function.
-    extended: TracedSystem,
-}
-
-impl EventGradient {
-    /// Of the first component of a system with these rules, by the states and these parameters.
-    ///
-    /// # Errors
-    /// If an expression cannot be compiled.
-    pub fn new(
-        function: &TracedSystem,
-        rules: &Rules,
-        parameters: &[usize],
-    ) -> Result<Self, Error> {
-        let extended = extended_system(function, rules, parameters)?;
-        Ok(EventGradient { extended })
-    }
-
-    /// The derivatives by the time and by the extended state on the side that the point lies on; NaN where there are none.
-    pub(super) fn at(&self, t: f64, z: &[f64], q: &[f64]) -> Result<(f64, Vec<f64>), FieldError> {
-        let system = &self.extended;
-        let signs = sides_of(system, (t, z), q)?;
-        let linearisations = system.linearisations();
-        let known = linearisations.and_then(|known| Some((known, known.motion_jacobian(&[])?)));
-        let Some((known, jacobian)) = known else {
-            return Ok((f64::NAN, vec![f64::NAN; z.len()]));
-        };
-        let mut slopes = jacobian.linearisation();
-        known.eval_jacobian(&jacobian, &Setting::new(&signs, q).at(t, z), &mut slopes);
-        let mut gradient = vec![0.0; z.len()];
-        for (column, value) in slopes.rows().row(0) {
-            gradient[column] = -value;
-        }
-        Ok((slopes.time()[0], gradient))
-    }
-
-    /// How fast what fixes the time of a zero changes along a motion with these rates, and its derivatives by the extended state. That is
-    /// the function itself, or, if it jumps through zero, the function inside of it that vanishes there.
-    pub(super) fn at_zero(
-        &self,
-        (t, z): (f64, &[f64]),
-        q: &[f64],
-        rates: &[f64],
-    ) -> Result<(f64, Vec<f64>), FieldError> {
-        let system = &self.extended;
-        let (time, gradient) = self.at(t, z, q)?;
-        let rate = time + dot(&gradient, rates);
-        let signs = sides_of(system, (t, z), q)?;
-        let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(&Setting::new(&signs, q).at(t, z), &mut h)?;
-        let mut field = vec![0.0; z.len()];
-        let mut value_with = |signs: &[f64]| -> Result<f64, FieldError> {
-            system.field(&Setting::new(signs, q).at(t, z), &mut field)?;
-            Ok(field[0])
-        };
-        let value = value_with(&signs)?;
-        // Beside a zero of a factor all values are rounding: what is nearest to its zero, in time, fixes it.
-        let mut found = (time_to_zero(value, rate), rate, gradient);
-        for j in 0..h.len() {
-            let mut across = signs.clone();
-            across[j] = -signs[j];
-            if value * value_with(&across)? >= 0.0 {
-                continue;
-            }
-            let mut gradient = vec![0.0; z.len()];
-            let here = Setting::new(&signs, q).at(t, z);
-            let rate = system.gradient(j, &here, &mut gradient)? + dot(&gradient, rates);
-            let away = time_to_zero(h[j], rate);
-            if away < found.0 {
-                found = (away, rate, gradient);
-            }
-        }
-        Ok((found.1, found.2))
-    }
-}
-
-/// How long a value takes to its zero at this rate; infinitely long if nothing is known of it.
-fn time_to_zero(value: f64, rate: f64) -> f64 {
-    let time = if value == 0.0 {
-        0.0
-    } else {
-        (value / rate).abs()
-    };
-    if time.is_nan() {
-        f64::INFINITY
-    } else {
-        time
-    }
 }

@@ -13,6 +13,7 @@ mod between;
 mod borders;
 mod change;
 mod collocation;
+mod event_gradient;
 mod exponents;
 mod extended;
 mod forms;
@@ -30,8 +31,9 @@ mod series;
 mod tangents;
 
 pub use adjoint::{CostGradient, Stretch, Term, TermPoint, Trail, Walk, WayBack, When};
-pub use between::{Differentiated, DifferentiatedRun, EventGradient};
+pub use between::{Differentiated, DifferentiatedRun};
 pub use borders::Borders;
+pub use event_gradient::EventGradient;
 pub use exponents::{Exponents, Growth};
 pub use extended::{Column, Extended, Extension};
 pub use held::{ActionAt, GuardAt, HeldMotion};

@@ -571,6 +571,11 @@ impl<'a> Piece<'a> {
         Ok(())
     }
 
+    /// The multiplier of a surface slid on, at the point that was looked at last.
+    pub fn multiplier(&self, j: usize) -> f64 {
+        self.node_signs[j]
+    }
+
     /// The derivatives of the multiplier of a surface slid on, by the time and by the extended state; `None` where the graph has
     /// none. NaN where the jumps of the field are tangent to the surfaces: there the equations do not determine the multiplier.
     pub fn multiplier_slopes(
