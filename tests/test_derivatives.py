@@ -466,7 +466,8 @@ def test_an_action_that_puts_the_state_on_a_surface_is_named() -> None:
     system = fl.System(fun, n=1, resets=[put])
     # A level above 0.5 is crossed later, with three times the speed until then; one below is never met again.
     with pytest.warns(
-        fl.FilippovWarning, match=r"one_sided: the run is put on x\[0\] - level = 0 by an action at t = 1"
+        fl.FilippovWarning,
+        match=r"one_sided: the run is on x\[0\] - level = 0 at the very time of an action, t = 1",
     ):
         sol = system.solve((0.0, 2.0), [0.0], wrt=["level"])
     assert sol.derivative() == 0.0
@@ -791,3 +792,16 @@ def test_costs_with_staircases_have_gradients() -> None:
     time = np.log(2.0) / 0.9
     assert value == pytest.approx(time % 0.1 + 1.0, abs=1e-8)
     assert found["p"] == pytest.approx(-time / 0.9, abs=1e-7)
+
+
+@pytest.mark.parametrize("is_moved", [True, False])
+def test_a_crossing_at_the_very_time_of_a_kick_is_one_sided(is_moved: bool) -> None:
+    # x = a t reaches 1 at t = 1/a; the kick at 1 halves x. With a little less the kick comes first.
+    kick = fl.Reset(times=[1.0 if is_moved else 1.1], map=lambda t, x: [0.5 * x[0]])
+    system = fl.System(lambda t, x, a=1.0: [np.where(x[0] > 1.0, 3.0, a)], n=1, resets=kick)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        system.solve((0, 2), [0.0], wrt=["a"])
+        fl.gradient(system, (0, 2), [0.0], terminal=lambda t, y: y[0], wrt=["a"])
+    said = [str(w.message) for w in caught if "at the very time of an action" in str(w.message)]
+    assert len(said) == (2 if is_moved else 0)

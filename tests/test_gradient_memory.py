@@ -108,7 +108,7 @@ def gradients(
     return value, found, kept[0]
 
 
-@pytest.mark.filterwarnings("ignore:the run is put on")
+@pytest.mark.filterwarnings("ignore:the run is on .* at the very time of an action")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("case", CASES)
 def test_it_is_the_same_to_the_bit(

@@ -680,7 +680,7 @@ def borders_of(
     if lands_on:
         t, surfaces = lands_on
         met = tuple(names[j] for j in surfaces if j < len(names))
-        what = f"is put on {', '.join(met)} = 0 by an action at t = {t:.10g}"
+        what = f"is on {', '.join(met)} = 0 at the very time of an action, t = {t:.10g}"
         borders.append(Border(what, "by what moves it off", met, t))
     if at_action:
         borders.append(Border("starts at the very time of an action", "by the initial time"))

@@ -9,8 +9,8 @@ use std::cell::RefCell;
 
 use super::between::state_at;
 use super::borders::{
-    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
-    surfaces_landed_on, ticks_at_start, Borders, Kept,
+    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_action,
+    surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
 use super::event_gradient::EventGradient;
@@ -673,7 +673,7 @@ impl<'w> Walk<'w> {
         } else {
             match instant.through(&weights, &mut 0.0)? {
                 Ok(passages) => {
-                    self.land(record, instant.after, &passages)?;
+                    self.land(record, (instant.before, instant.after), &passages)?;
                     self.pull_back(record, &passages, n)
                 }
                 Err(lost) => return Ok(Some(lost.name())),
@@ -736,11 +736,11 @@ impl<'w> Walk<'w> {
             })
     }
 
-    /// Notes on which surfaces actions put the state, for changes of the state before them and of what is asked for.
+    /// Notes on which surfaces the state is before and behind actions, for changes of the state before them and of what is asked for.
     fn land(
         &mut self,
         record: &InstantRecord,
-        after: &mut Piece,
+        (before, after): (&mut Piece, &mut Piece),
         passages: &[Passage],
     ) -> Result<(), FieldError> {
         let extended = after.extended;
@@ -752,13 +752,17 @@ impl<'w> Walk<'w> {
         let parameters = others.filter(|kind| matches!(kind, Column::Parameter(_)));
         let kinds: Vec<Column> = states.chain(parameters).collect();
         let mut columns = extended.columns_at_start(&kinds, &[]);
+        let columns_before = columns.clone();
         let dt: Vec<f64> = columns.iter().map(|c| dot(&last.time, c)).collect();
         let mut arrives = false;
         for passage in passages {
             arrives |= !passage.apply(extended.n, &mut columns).is_empty();
         }
         self.borders.ends_at_instant |= arrives && record.t[1] == self.t_last;
-        let landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;
+        let mut landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;
+        if landed.is_empty() {
+            landed = surfaces_at_action(before, record, &dt, &columns_before)?;
+        }
         if !landed.is_empty() {
             self.borders.lands_on = Some((record.t[1], landed));
         }

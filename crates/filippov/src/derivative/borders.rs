@@ -14,7 +14,8 @@ use crate::vectors::dot;
 pub struct Borders {
     /// Surfaces on which the run starts and at which the sides differ: derivatives by the start, and by parameters of these.
     pub starts_on: Vec<usize>,
-    /// The first time at which an action puts the state on surfaces at which the sides differ, and these: all derivatives from there.
+    /// The first time at which an action finds the state on surfaces at which the sides differ, or puts it there, and these: all
+    /// derivatives from there.
     pub lands_on: Option<(f64, Vec<usize>)>,
     /// The multiplier of such a surface stays at its end at the start, and a changed run slides, or leaves the surface.
     pub starts_at_end: bool,
@@ -83,6 +84,23 @@ pub(super) fn surfaces_landed_on(
         }
     }
     Ok(found)
+}
+
+/// The surfaces on which the state is when actions are done at a known time, and at which the sides differ for one of these columns: a
+/// changed run meets them before the actions or not; `dt` are the derivatives of the time.
+pub(super) fn surfaces_at_action(
+    piece: &mut Piece,
+    record: &InstantRecord,
+    dt: &[f64],
+    columns: &[Vec<f64>],
+) -> Result<Vec<usize>, FieldError> {
+    if record.acts.is_empty() || !record.guards.is_empty() {
+        return Ok(Vec::new());
+    }
+    let z = piece.extended.state(record.x[0]);
+    let moved = |(&dt, column): (&f64, &Vec<f64>)| Beside::moved(dt, column, record.field[0]);
+    let moved: Vec<Beside> = dt.iter().zip(columns).map(moved).collect();
+    Ok(surfaces_with_sides(piece, (record.t[0], &z), &moved)?.0)
 }
 
 /// The derivatives of h_j by time and state, if a place is on the surface.

@@ -1,8 +1,8 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{
-    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_start,
-    surfaces_landed_on, ticks_at_start, Borders, Kept,
+    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_action,
+    surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
 use super::extended::{Column, Extended};
@@ -459,10 +459,15 @@ impl<'a> Tangents<'a> {
             {
                 let arrives = all.iter().any(|found| found.arrives);
                 let columns = &self.columns;
-                let landed = surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
+                let mut landed =
+                    surfaces_landed_on(&mut after, record, &last.dt, columns, arrives)?;
                 let z = self.around.extended.state(record.x[1]);
                 let kept = Kept::all(&landed, true, &after, (record.t[1], &z), columns)?;
                 self.kept_on.extend(kept);
+                if landed.is_empty() {
+                    let columns = &self.columns_before;
+                    landed = surfaces_at_action(&mut before, record, &last.dt, columns)?;
+                }
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
             }
