@@ -3,7 +3,7 @@
 use super::extended::extended_system;
 use super::piece::Piece;
 use crate::error::{Error, FieldError};
-use crate::system::{sides_of, PiecewiseSystem, Rules, Setting, SignStructure, TracedSystem};
+use crate::system::{sides_where, PiecewiseSystem, Rules, Setting, SignStructure, TracedSystem};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -88,12 +88,13 @@ impl EventGradient {
 
     /// The signs at a point of a motion: those of its mode, 1 on surfaces slid on, and the sides on which other functions are.
     fn signs(&self, piece: &Piece, (t, z): (f64, &[f64])) -> Result<Vec<f64>, FieldError> {
-        let known = piece.signs.iter().enumerate().map(|(j, &sign)| {
-            let is_slid_on = piece.sliding.contains(&j);
-            (j, if is_slid_on { 1.0 } else { sign })
-        });
-        let known: Vec<(usize, f64)> = known.filter(|(_, sign)| *sign != 0.0).collect();
-        sides_of(&self.extended, (t, z), &piece.q, &known)
+        let set = |signs: &mut [f64]| {
+            for (j, &known) in piece.signs.iter().enumerate() {
+                signs[j] = if known == 0.0 { signs[j] } else { known };
+            }
+            piece.sliding.iter().for_each(|&j| signs[j] = 1.0);
+        };
+        sides_where(&self.extended, (t, z), &piece.q, set)
     }
 
     fn with_signs(

@@ -568,7 +568,7 @@ impl<'a> ExtendedMap<'a> {
         values: &[f64],
     ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
         let expressions = self.expressions;
-        let signs = sides_of(expressions, (t, x), &[], &[])?;
+        let signs = sides_of(expressions, (t, x), &[])?;
         let z = [x, values].concat();
         let mut out = vec![0.0; self.entries.len() + self.n];
         let place = Place::new(t, &z, &signs);

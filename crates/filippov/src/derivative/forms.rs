@@ -163,7 +163,7 @@ impl MapAt<'_> {
     /// The mixed derivative behind, from that before, that of the time, and both changes.
     pub fn second_image(&self, q: &[f64], tau: f64, u: &Moved, v: &Moved) -> Vec<f64> {
         let none: &[f64] = &[];
-        let Ok(signs) = sides_of(self.system, (self.t, &self.inputs), none, &[]) else {
+        let Ok(signs) = sides_of(self.system, (self.t, &self.inputs), none) else {
             return vec![f64::NAN; self.n];
         };
         let place = Place::new(self.t, &self.inputs, &signs);

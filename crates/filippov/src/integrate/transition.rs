@@ -20,6 +20,7 @@ use crate::mode::Mode;
 use crate::motion::{
     Guard, Leading, ModeField, Projector, RootEnd, Run, Seen, SlidingSet, SmoothField,
 };
+use crate::page::IS_PAGE;
 use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, Warning, WarningCode};
@@ -826,7 +827,7 @@ impl<'a> Integrator<'a> {
         }
         self.run.stats.n_events += done.len() as u64;
         // A law moves no state, though the instant may put it onto a surface, by a rounding.
-        if done.iter().any(|act| act.y_before != act.y_after) {
+        if !IS_PAGE && done.iter().any(|act| act.y_before != act.y_after) {
             self.recorder.user_events.forget_sides();
         }
         done.into_iter()

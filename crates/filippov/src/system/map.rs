@@ -53,12 +53,22 @@ impl TracedMap {
     }
 }
 
-/// The sides of its surfaces on which a state is; those of some surfaces are known.
+/// The sides of its surfaces on which a state is.
 pub(crate) fn sides_of(
+    expressions: &TracedSystem,
+    at: (f64, &[f64]),
+    q: &[f64],
+) -> Result<Vec<f64>, FieldError> {
+    sides_where(expressions, at, q, |_| ())
+}
+
+/// The same where something else sets some of them.
+#[inline(always)]
+pub(crate) fn sides_where(
     expressions: &TracedSystem,
     (t, x): (f64, &[f64]),
     q: &[f64],
-    known: &[(usize, f64)],
+    set: impl Fn(&mut [f64]),
 ) -> Result<Vec<f64>, FieldError> {
     let d = expressions.n_surfaces();
     let mut signs = vec![1.0; d];
@@ -68,7 +78,7 @@ pub(crate) fn sides_of(
         expressions.surfaces(&Setting::new(&signs, q).at(t, x), &mut h)?;
         let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
         signs = sides.collect();
-        known.iter().for_each(|&(j, sign)| signs[j] = sign);
+        set(&mut signs);
     }
     Ok(signs)
 }
@@ -81,7 +91,7 @@ impl ActionMap for TracedMap {
     fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let before = self.with_named(x, q);
         let mut after = before.clone();
-        let signs = sides_of(&self.expressions, (t, &before), &[], &[])?;
+        let signs = sides_of(&self.expressions, (t, &before), &[])?;
         let place = Place::new(t, &before, &signs);
         self.expressions.field(&place, &mut after)?;
         let (states, named) = after.split_at(x.len());
@@ -110,7 +120,7 @@ impl ActionMap for TracedMap {
         let way = MOMENT * MOMENT * (1.0 + dot(x, x).sqrt()) / norm;
         let beside = before.iter().zip(&direction).map(|(x, d)| x + way * d);
         let beside: Vec<f64> = beside.collect();
-        let signs = sides_of(&self.expressions, (t, &beside), &[], &[])?;
+        let signs = sides_of(&self.expressions, (t, &beside), &[])?;
         let place = Place::new(t, &before, &signs);
         self.expressions
             .eval(program, &place, &direction, &mut change);
