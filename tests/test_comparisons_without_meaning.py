@@ -165,6 +165,16 @@ def test_an_output_that_cannot_be_traced_at_one_end_of_a_sweep_is_left_out(value
     assert "floor" not in found
 
 
+def test_outputs_at_points_that_are_no_numbers() -> None:
+    system = fl.System(lambda t, x, p=0.7: [x[1], -x[0]], n=2, outputs={"gear": gear})
+    for values in ([0.7, np.nan, 0.2, np.nan, np.nan], [np.nan, 0.7, 0.2]):
+        found = fl.sweep(system, (0, 3), [1.7, 0.3], {"p": values})
+        exact = [
+            system.solve((0, 3), [1.7, 0.3], p=0.7 if p > 0.5 else 0.2).outputs["gear"][-1] for p in values
+        ]
+        assert found["gear"].values == pytest.approx(exact, abs=1e-9)
+
+
 def test_a_store_knows_an_output_of_several_forms(tmp_path: Any) -> None:
     def system(low: float) -> fl.System:
         outputs = {"gear": lambda t, x, p: x[0] if p > 0.5 else low}

@@ -81,7 +81,8 @@ def gradient(
     instants : sequence of (when, callable), optional
         ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a
         function ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about).
-        The state is that before the instant.
+        The state is that before the instant, and so are relays and signs. While the motion slides on a
+        surface its sign is the multiplier, as in `Solution.evaluate`.
     wrt : str or sequence of str, optional
         As for `solve_ivp`: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` (default), ``"all"``.
     events : optional

@@ -306,11 +306,12 @@ class Plan(NamedTuple):
                     place = section.place(prepared, self.grid.states, t0, first, values)
         except InputError as error:
             return error
-        if prepared is not self.prepared or not outputs.n_valid(p[:1]):
+        if prepared is not self.prepared or outputs.n_valid(p[:1]) < 1:
             outputs = traced_outputs(self.system, prepared, t0, first, values).chosen(self.outputs.names)
             if outputs.names != self.outputs.names:
                 return InputError("outputs: other ones can be traced for these parameter values")
-        return _Form(prepared, place, columns, outputs.found, outputs.n_valid(p))
+        # A row that is no number is like no other one, not even like itself.
+        return _Form(prepared, place, columns, outputs.found, max(outputs.n_valid(p), 1))
 
     def identity(self) -> dict[str, str]:
         """Return what the result follows from, as digests and text."""
