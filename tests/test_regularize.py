@@ -223,6 +223,9 @@ def test_a_twin_follows_the_conditions_on_parameters_of_its_system() -> None:
     for p in (0.5, 0.1, 0.0, 0.5):
         exact = system.solve((0, 1), [1.0, 0.2], p=p).y[:, -1]
         assert smooth.solve((0, 1), [1.0, 0.2], p=p).y[:, -1] == pytest.approx(exact, abs=1e-3)
+    values = [0.5, 0.1, 0.0]
+    alone = [smooth.solve((0, 1), [1.0, 0.2], p=p).y[0, -1] for p in values]
+    assert smooth.ensemble((0, 1), [1.0, 0.2], {"p": values}).y[:, 0] == pytest.approx(alone, abs=1e-12)
     for eps in (0.0, -0.1):
         with pytest.raises(fl.InputError, match="eps: a positive"):
             smooth.solve((0, 1), [1.0, 0.2], eps=eps)
@@ -231,3 +234,14 @@ def test_a_twin_follows_the_conditions_on_parameters_of_its_system() -> None:
     assert copy.solve((0, 1), [1.0, 0.2]).y[:, -1] == pytest.approx(exact, abs=1e-12)
     with pytest.raises(fl.ModelError, match="valid for"):
         copy.solve((0, 1), [1.0, 0.2], p=0.1)
+
+
+@pytest.mark.parametrize("values", [[0.5, 0.0], [0.0, 0.5]])
+def test_twins_in_ensembles_and_sweeps_have_the_form_of_each_point(values: list[float]) -> None:
+    system = fl.System(lambda t, x, p=0.5: [x[1], -x[0] + 0.4 * np.where(p * x[0] > 0, 1.0, 0.0)], n=2)
+    smooth = system.regularize(1e-3)
+    exact = [system.solve((0, 1), [1.0, 0.2], p=p).y[0, -1] for p in values]
+    assert smooth.ensemble((0, 1), [1.0, 0.2], {"p": values}).y[:, 0] == pytest.approx(exact, abs=1e-3)
+    assert fl.sweep(smooth, (0, 1), [1.0, 0.2], {"p": values})["x[0]"].values == pytest.approx(
+        exact, abs=1e-3
+    )

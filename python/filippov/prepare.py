@@ -55,6 +55,8 @@ class Prepared(NamedTuple):
         What may be wrong with the comparisons of a traced function, for warnings.
     borders : tuple of str
         Conditions on parameters that others, as near to these as one likes, decide differently.
+    twin_of : Prepared or None
+        Of a regularised system, whose last parameter is its width: the system that it regularises.
     """
 
     core: CoreSystem
@@ -66,6 +68,7 @@ class Prepared(NamedTuple):
     remembers: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     borders: tuple[str, ...] = ()
+    twin_of: Prepared | None = None
 
     @property
     def why_untraced(self) -> str:
@@ -130,6 +133,8 @@ class Prepared(NamedTuple):
         """
         if self.pinned is not None:
             return n_alike(table)
+        if self.twin_of is not None:
+            return self.twin_of.n_valid(table[:, :-1])
         if not isinstance(self.core, TracedSystem) or self._holds_for_all():
             return len(table)
         table = np.ascontiguousarray(table)

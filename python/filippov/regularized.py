@@ -103,7 +103,7 @@ def regularized(prepared: Prepared, eps: str, kind: Any, kappa: Any) -> Prepared
         twin = core.regularized(eps, factors, kind == "linear")
     except ValueError as error:
         raise ModelError(f"regularize: {error}") from None
-    return Prepared(twin, None, tuple(twin.surfaces()), None, "")
+    return Prepared(twin, None, tuple(twin.surfaces()), None, "", twin_of=prepared)
 
 
 def _factors(kappa: Any, surfaces: Sequence[str]) -> list[float]:
