@@ -482,7 +482,7 @@ class _Sum:
             if isinstance(there, TracedSystem):
                 return there
         if isinstance(found, str) and t is not None:
-            near = self._sol.trace_near(own, t)
+            near = self._sol._trace_near(own, t)
             if isinstance(near, TracedSystem):
                 return near
         if isinstance(found, str):

@@ -35,7 +35,7 @@ from filippov.switches import (
     import_xarray,
     symmetric,
 )
-from filippov.trace.tracer import trace_near_point, trace_output
+from filippov.trace.tracer import trace_output
 from filippov.unknown import did_you_mean, refuse_at_drawing
 
 if TYPE_CHECKING:
@@ -444,12 +444,12 @@ class Solution:
     def _derivative_of_zero(self, g: Callable[..., Any], t: float) -> Array:
         """Return the derivative of the time of one zero of a function with floors; NaN if it is not known."""
         assert isinstance(self._run, Run)
-        function = self.trace_near(g, t)
+        function = self._trace_near(g, t)
         if isinstance(function, str):
             return np.full(len(self.wrt), np.nan)
         return self._run.zero_derivatives(function, np.array([t]))[0]
 
-    def trace_near(self, g: Callable[..., Any], t: float) -> TracedSystem | str:
+    def _trace_near(self, g: Callable[..., Any], t: float) -> TracedSystem | str:
         """Return a function as an expression near the motion just before a time, or why there is none."""
         origin = self._origin
         assert isinstance(self._run, Run)
@@ -458,7 +458,8 @@ class Solution:
         held = self._run.discrete(time, n_laws, True)[:, 0] if n_laws else np.zeros(0)
         y = self._kept_function()(time, "left")[:, 0]
         values = origin.values or {}
-        return trace_near_point(origin.prepared.trace, g, origin.args, t=t, y=y, held=held, parameters=values)
+        trace, near = origin.prepared.trace, (t, y, held)
+        return trace_output(trace, g, origin.args, parameters=values, near=near)
 
     def derivative(self, t: npt.ArrayLike | None = None, side: str = "right", order: int = 1) -> Array:
         """Return the derivative of the state by the start and parameters, as asked for with ``wrt=``.

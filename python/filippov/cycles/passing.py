@@ -56,7 +56,7 @@ def beyond_change(
         if new is None:
             return None
         places = _places_on(new, curve, w)
-        # The same modes may follow one another, each in the place of another one.
+        # Two cycles may have the same modes in the same order, and one of them in each place the other mode.
         _, _, longest, mode = max(places)
         if new.itinerary.is_same(itinerary) and new.itinerary.mode_at(longest) == mode:
             return None

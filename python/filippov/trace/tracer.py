@@ -34,7 +34,6 @@ __all__ = [
     "trace_beside",
     "trace_event",
     "trace_for_rows",
-    "trace_near_point",
     "trace_output",
 ]
 
@@ -322,30 +321,15 @@ def trace_output(
     args: tuple[Any, ...] = (),
     *,
     parameters: Mapping[str, float],
+    near: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> TracedSystem | str:
     """Turn a function into an expression beside an existing trace, as `trace_event` does, near these values.
 
     It is returned as the first component of the field of a system, which has the derivatives of the function.
+    Near a point, a time with the states and the discrete states, it may take floors that the field does not
+    have: they are the whole numbers on both sides of the point.
     """
-    found = _beside(traced, g, args, None, None, parameters)
-    return found if isinstance(found, str) else _with_derivatives(*found[1:])
-
-
-def trace_near_point(
-    traced: Trace,
-    g: Callable[..., Any],
-    args: tuple[Any, ...] = (),
-    *,
-    t: float,
-    y: NDArray[np.float64],
-    held: NDArray[np.float64],
-    parameters: Mapping[str, float],
-) -> TracedSystem | str:
-    """Return what `trace_output` returns, near a point.
-
-    Floors that the field does not have are those there, on both sides of a whole number. The discrete states
-    are `held`.
-    """
+    t, y, held = (None, None, None) if near is None else near
     found = _beside(traced, g, args, t, y, parameters, held=held)
     return found if isinstance(found, str) else _with_derivatives(*found[1:])
 
