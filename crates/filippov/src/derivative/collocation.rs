@@ -1,6 +1,7 @@
 //! The collocation of M' = Df M + D_p f on a part of a step, and its transpose.
 
-use super::radau::{INTEGRALS, STAGES, WEIGHTS};
+use super::lengths::allowed;
+use super::radau::{HIGHEST, HIGHEST_BACK, HIGHEST_RATES, INTEGRALS, STAGES, WEIGHTS};
 use crate::cube::{Elimination, Matrix, Vector};
 use crate::sparse::{SparseRows, SparseSolver};
 use crate::system::Linearisation;
@@ -16,6 +17,17 @@ const MOST_ITERATED: usize = 16;
 const MOST_ITERATIONS: usize = 40;
 const CONTRACTION: f64 = 0.5;
 
+/// The error of a part by the highest coefficient of the rates along it, both relative to the size of a value. It goes with the square:
+/// the quadrature is exact for polynomials of about twice the degree. The coefficient before it tells about the highest one too,
+/// which may be zero by chance.
+fn error_by([before, last]: [f64; 2]) -> f64 {
+    let highest = last.abs().max(0.7 * before.abs().powf(7.0 / 6.0));
+    0.03 * highest * highest
+}
+
+/// Values below this share of the largest are not looked at where the derivatives of the field are differences.
+const SHARE_BY_DIFFERENCES: f64 = 1e-4;
+
 /// The fastest rate of a sliding motion is seen in so many applications of its derivative.
 const FASTEST_POWER: u32 = 4;
 
@@ -28,6 +40,9 @@ pub(super) struct Collocation {
     m: usize,
     /// Iteration ends at changes so small beside the result.
     rest: f64,
+    /// The error that a part may have, and the share of the largest value below which none is looked at.
+    allowed: f64,
+    least: f64,
     dt: f64,
     way: Way,
     /// The right-hand side of the matrix, by the change at the start with the shares of the parameters behind it.
@@ -35,8 +50,12 @@ pub(super) struct Collocation {
     sparse: SparseSolver,
     /// In what the changes of the states are measured in the full matrix.
     units: Vec<f64>,
-    /// What iterations need of each node.
+    /// By what the rows of the full matrix are multiplied.
+    scales: Vec<f64>,
+    /// What iterations and terms need of each node.
     nodes: Vec<Node>,
+    /// What was found for the end of a part, or for its start on the way back.
+    ends: Vec<Vec<f64>>,
 }
 
 /// The derivatives at a node without those by the parameters, and what the multipliers follow from.
@@ -115,82 +134,209 @@ fn fastest_in_region(rows: &SparseRows, n: usize) -> f64 {
 
 impl Collocation {
     /// For n states and m parameters, in runs with this tolerance.
-    pub fn new((n, m): (usize, usize), rtol: f64) -> Self {
+    pub fn new((n, m): (usize, usize), rtol: f64, by_differences: bool) -> Self {
         Collocation {
             n,
             m,
             rest: (1e-3 * rtol).max(4.0 * EPS),
+            allowed: allowed(rtol),
+            least: if by_differences {
+                SHARE_BY_DIFFERENCES
+            } else {
+                0.0
+            },
             dt: f64::NAN,
             way: Way::Sparse(false),
             right: SparseRows::new(n + m),
             sparse: SparseSolver::for_all_pivots(),
             units: vec![1.0; n],
+            scales: Vec::new(),
             nodes: Vec::new(),
+            ends: Vec::new(),
         }
     }
 
-    /// Carries changes on over a part of this length, each of n states with the shares of the parameters behind them.
-    pub fn carry(&mut self, nodes: &[Linearisation], dt: f64, columns: &mut [Vec<f64>]) {
+    /// Carries changes on over a part of this length, each of n states with the shares of the parameters behind them. Returns an
+    /// estimate of their error, relative to the size of each value; [`accept`](Self::accept) takes what was found.
+    pub fn carry(&mut self, nodes: &[Linearisation], dt: f64, columns: &[Vec<f64>]) -> f64 {
         self.take(nodes, dt, Measured::Changes(columns), columns.len());
+        let mut all = Vec::with_capacity(columns.len());
         if matches!(self.way, Way::Iteration) {
-            let found: Option<Vec<Vec<f64>>> =
-                columns.iter().map(|c| self.iterate(nodes, c)).collect();
-            if let Some(found) = found {
-                for (column, end) in columns.iter_mut().zip(found) {
-                    column[..self.n].copy_from_slice(&end);
-                }
-                return;
+            let found = columns.iter().map(|c| self.iterate(nodes, c));
+            match found.collect::<Option<Vec<_>>>() {
+                Some(found) => all = found,
+                None => self.way = Way::Sparse(self.factor_sparse(nodes, false)),
             }
-            self.way = Way::Sparse(self.factor_sparse(nodes, false));
         }
-        for column in columns {
-            let rows = 0..self.right.n_rows();
-            let mut right: Vec<f64> = rows.map(|k| self.right.dot(k, column)).collect();
-            match &self.way {
-                Way::Full(elimination) => right = elimination.solve(&right).into_vec(),
-                Way::Sparse(true) => self.sparse.solve(&mut right),
-                _ => right.fill(f64::NAN),
+        if !matches!(self.way, Way::Iteration) {
+            all.extend(columns.iter().map(|column| self.stages(column)));
+        }
+        let mut error = 0.0_f64;
+        for (column, stages) in columns.iter().zip(&all) {
+            error = error.max(self.error(nodes, column, stages));
+        }
+        let ends = all.into_iter().filter_map(|mut stages| stages.pop());
+        self.ends = ends.collect();
+        error
+    }
+
+    /// The change at the nodes, by the matrix that was factored.
+    fn stages(&mut self, column: &[f64]) -> Vec<Vec<f64>> {
+        let rows = 0..self.right.n_rows();
+        let mut right: Vec<f64> = rows.map(|k| self.right.dot(k, column)).collect();
+        match &self.way {
+            Way::Full(elimination) => {
+                scale(&mut right, &self.scales);
+                right = elimination.solve(&right).into_vec();
             }
-            let block = right.len() / STAGES;
-            let end = column[..self.n]
-                .iter_mut()
-                .zip(&right[(STAGES - 1) * block..]);
-            let end = end.zip(&self.units);
-            end.for_each(|((entry, value), unit)| *entry = unit * value);
+            Way::Sparse(true) => self.sparse.solve(&mut right),
+            _ => right.fill(f64::NAN),
         }
+        let block = right.len() / STAGES;
+        let stages = right.chunks_exact(block).map(|stage| {
+            let mut stage = stage[..self.n].to_vec();
+            scale(&mut stage, &self.units);
+            stage
+        });
+        stages.collect()
+    }
+
+    /// The error of a change over a part, relative to its size.
+    fn error(&mut self, nodes: &[Linearisation], column: &[f64], stages: &[Vec<f64>]) -> f64 {
+        let n = self.n;
+        let highest = |r: usize| {
+            HIGHEST_RATES.map(|weights| {
+                let pairs = weights.iter().zip(stages);
+                pairs.map(|(w, stage)| w * (stage[r] - column[r])).sum()
+            })
+        };
+        let highest: Vec<[f64; 2]> = (0..n).map(highest).collect();
+        let mut sizes: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
+        for stage in stages {
+            raise(&mut sizes, stage);
+        }
+        let error = self.error_of(&highest, &mut sizes);
+        if error.is_nan() || error <= self.allowed {
+            return error;
+        }
+        // What rounding leaves of a value looks rough. It is small beside the terms of the value.
+        self.look_at(nodes);
+        let mut terms: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
+        for (i, stage) in stages.iter().enumerate() {
+            let by_parameters = self.by_parameters(nodes[i].rows(), column);
+            let dt = self.dt * INTEGRALS[STAGES - 1][i];
+            self.nodes[i].add_terms(stage, &by_parameters, dt, &mut terms);
+        }
+        raise(&mut sizes, &terms);
+        self.error_of(&highest, &mut sizes)
+    }
+
+    /// The largest error of values of these sizes.
+    fn error_of(&self, highest: &[[f64; 2]], sizes: &mut [f64]) -> f64 {
+        if self.least > 0.0 {
+            let largest = sizes.iter().fold(0.0_f64, |most, size| size.max(most));
+            let sizes = sizes.iter_mut();
+            sizes.for_each(|size| *size = size.max(self.least * largest));
+        }
+        let pairs = highest.iter().zip(sizes).filter(|(_, size)| **size > 0.0);
+        let errors = pairs.map(|(highest, size)| error_by(highest.map(|c| c / *size)));
+        errors.fold(0.0, f64::max)
     }
 
     /// Takes the gradient of a function by the state at the end of a part back to the start, and adds to the shares of the
-    /// parameters.
-    pub fn pull_back(&mut self, nodes: &[Linearisation], dt: f64, gradient: &mut [f64]) {
+    /// parameters. Returns an estimate of its error, relative to the size of each entry; [`accept`](Self::accept) takes what was found.
+    pub fn pull_back(&mut self, nodes: &[Linearisation], dt: f64, gradient: &[f64]) -> f64 {
         self.take(nodes, dt, Measured::Gradient(gradient), 1);
+        let weights = self.weights(nodes, gradient);
+        let (n, m, block) = (self.n, self.m, weights.len() / STAGES);
+        let mut end = gradient.to_vec();
+        end[..n].fill(0.0);
+        let mut shares = vec![0.0; STAGES * m];
+        for (k, weight) in weights.iter().enumerate() {
+            for (c, value) in self.right.row(k) {
+                end[c] += weight * value;
+                if let Some(p) = c.checked_sub(n) {
+                    shares[k / block * m + p] += weight * value;
+                }
+            }
+        }
+        let weights: Vec<&[f64]> = weights.chunks_exact(block).map(|w| &w[..n]).collect();
+        let error = self.error_back(nodes, (gradient, &end), &weights, &shares);
+        self.ends = vec![end];
+        error
+    }
+
+    /// The weights of the rows of the equations in a gradient: of those of the states U, for which W^T U = b + dt Df^T U, where b is
+    /// the gradient at the last node.
+    fn weights(&mut self, nodes: &[Linearisation], gradient: &[f64]) -> Vec<f64> {
         if matches!(self.way, Way::Iteration) {
-            if self.iterate_back(nodes, gradient) {
-                return;
+            if let Some(weights) = self.iterate_back(nodes, gradient) {
+                return weights;
             }
             self.way = Way::Sparse(self.factor_sparse(nodes, true));
         }
         let block = self.right.n_rows() / STAGES;
         let mut weights = vec![0.0; STAGES * block];
-        let last = weights[(STAGES - 1) * block..].iter_mut().zip(&*gradient);
-        let last = last.zip(&self.units);
-        last.for_each(|((weight, entry), unit)| *weight = unit * entry);
+        weights[(STAGES - 1) * block..][..self.n].copy_from_slice(&gradient[..self.n]);
         match &self.way {
-            Way::Full(elimination) => weights = elimination.solve_transposed(&weights).into_vec(),
+            Way::Full(elimination) => {
+                scale(&mut weights[(STAGES - 1) * block..], &self.units);
+                weights = elimination.solve_transposed(&weights).into_vec();
+                scale(&mut weights, &self.scales);
+            }
             Way::Sparse(true) => self.sparse.solve(&mut weights),
             _ => weights.fill(f64::NAN),
         }
-        gradient[..self.n].fill(0.0);
-        for (k, weight) in weights.iter().enumerate() {
-            for (c, value) in self.right.row(k) {
-                gradient[c] += weight * value;
-            }
+        weights
+    }
+
+    /// The error of a gradient over a part, relative to the sizes of its entries, by its weights and shares at the nodes.
+    fn error_back(
+        &mut self,
+        nodes: &[Linearisation],
+        (gradient, end): (&[f64], &[f64]),
+        weights: &[&[f64]],
+        shares: &[f64],
+    ) -> f64 {
+        let (n, m) = (self.n, self.m);
+        let of_state = |c: usize| {
+            [0, 1].map(|k| {
+                let pairs = HIGHEST_BACK[k].iter().zip(weights);
+                let all: f64 = pairs.map(|(h, weights)| h * weights[c]).sum();
+                all - HIGHEST[k][STAGES - 1] * gradient[c]
+            })
+        };
+        let of_share = |p: usize| {
+            HIGHEST.map(|highest| {
+                let nodes = highest.iter().enumerate();
+                nodes.map(|(i, h)| h * shares[i * m + p]).sum()
+            })
+        };
+        let highest = (0..n).map(of_state).chain((0..m).map(of_share));
+        let highest: Vec<[f64; 2]> = highest.collect();
+        let mut sizes: Vec<f64> = gradient.iter().map(|v| v.abs()).collect();
+        raise(&mut sizes, end);
+        let error = self.error_of(&highest, &mut sizes);
+        if error.is_nan() || error <= self.allowed {
+            return error;
+        }
+        self.look_at(nodes);
+        let terms = self.terms_back(nodes, gradient, weights);
+        raise(&mut sizes, &terms);
+        self.error_of(&highest, &mut sizes)
+    }
+
+    /// Takes what was found by [`carry`](Self::carry) or [`pull_back`](Self::pull_back).
+    pub fn accept<'c>(&self, columns: impl IntoIterator<Item = &'c mut Vec<f64>>) {
+        for (column, end) in columns.into_iter().zip(&self.ends) {
+            column[..end.len()].copy_from_slice(end);
         }
     }
 
     /// Chooses the way for these changes, or for one on the way back.
     fn take(&mut self, nodes: &[Linearisation], dt: f64, measured: Measured, n_columns: usize) {
         self.dt = dt;
+        self.nodes.clear();
         self.way = Way::Sparse(false);
         self.units.fill(1.0);
         if self.n <= MOST_FULL {
@@ -204,15 +350,22 @@ impl Collocation {
             self.way = Way::Sparse(self.factor_sparse(nodes, false));
             return;
         }
-        self.nodes.clear();
-        let sizes = (self.n, self.m);
-        let own = nodes.iter().map(|node| Node::of(node.rows(), sizes));
-        self.nodes.extend(own);
+        self.look_at(nodes);
+        self.take_right(nodes);
         self.way = Way::Iteration;
     }
 
-    /// The change at the end, by iteration; `None` if it does not converge.
-    fn iterate(&self, nodes: &[Linearisation], column: &[f64]) -> Option<Vec<f64>> {
+    /// Takes what iterations and terms need of the nodes.
+    fn look_at(&mut self, nodes: &[Linearisation]) {
+        if self.nodes.is_empty() {
+            let sizes = (self.n, self.m);
+            let own = nodes.iter().map(|node| Node::of(node.rows(), sizes));
+            self.nodes.extend(own);
+        }
+    }
+
+    /// The change at the nodes, by iteration; `None` if it does not converge.
+    fn iterate(&self, nodes: &[Linearisation], column: &[f64]) -> Option<Vec<Vec<f64>>> {
         let n = self.n;
         let by_parameters: Vec<Vec<f64>> = nodes
             .iter()
@@ -239,15 +392,13 @@ impl Collocation {
             }
             if change <= self.rest * size {
                 let mut terms: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
-                for (node, stage) in self.nodes.iter().zip(&stages) {
-                    node.add_terms(stage, self.dt, &mut terms);
-                }
-                for by_parameters in &by_parameters {
-                    let shares = terms.iter_mut().zip(by_parameters);
-                    shares.for_each(|(terms, share)| *terms += (self.dt * share).abs());
+                for ((node, stage), by_parameters) in
+                    self.nodes.iter().zip(&stages).zip(&by_parameters)
+                {
+                    node.add_terms(stage, by_parameters, self.dt, &mut terms);
                 }
                 if self.are_small(&changes, &terms) {
-                    return stages.pop();
+                    return Some(stages);
                 }
             }
             if change.is_nan() || change > CONTRACTION * before[0] {
@@ -277,7 +428,7 @@ impl Collocation {
 
     /// The same for the transposed equations: V_i = b_i + dt Df_i^T U_i with U_i = sum_j C_ji V_j, where b is the gradient at the last
     /// node.
-    fn iterate_back(&self, nodes: &[Linearisation], gradient: &mut [f64]) -> bool {
+    fn iterate_back(&self, nodes: &[Linearisation], gradient: &[f64]) -> Option<Vec<f64>> {
         let n = self.n;
         let mut v = vec![vec![0.0; n]; STAGES];
         v[STAGES - 1].copy_from_slice(&gradient[..n]);
@@ -299,45 +450,44 @@ impl Collocation {
                 }
                 change = changes.iter().fold(change, |most, own| own.max(most));
             }
-            let mut terms = Vec::new();
-            if change <= self.rest * size {
-                terms.extend(gradient[..n].iter().map(|v| v.abs()));
-                for (node, u) in self.nodes.iter().zip(&u) {
-                    node.add_terms_back(u, self.dt, &mut terms);
-                }
-            }
-            if !terms.is_empty() && self.are_small(&changes, &terms) {
+            let is_small = change <= self.rest * size;
+            if is_small && self.are_small(&changes, &self.terms_back(nodes, gradient, &u)) {
                 integrate_back(&v, &mut u);
-                for (i, node) in nodes.iter().enumerate() {
-                    self.nodes[i].rates_back(&u[i], &mut back, &mut multipliers);
-                    self.add_shares(node.rows(), (&u[i], &multipliers), gradient);
+                let mut weights = Vec::with_capacity(self.right.n_rows());
+                for (node, u) in self.nodes.iter().zip(&u) {
+                    node.rates_back(u, &mut back, &mut multipliers);
+                    weights.extend_from_slice(u);
+                    weights.extend(multipliers.iter().map(|weight| self.dt * weight));
                 }
-                for r in 0..n {
-                    gradient[r] = v.iter().map(|v| v[r]).sum();
-                }
-                return true;
+                return Some(weights);
             }
             if change.is_nan() || change > CONTRACTION * before[0] {
-                return false;
+                return None;
             }
             before = [before[1], change];
         }
-        false
+        None
     }
 
-    /// Adds what the rows have in the shares of the parameters.
-    fn add_shares(
+    /// The sizes of the terms that a gradient at the start, and the shares of the parameters, are made of.
+    fn terms_back(
         &self,
-        rows: &SparseRows,
-        (weights, multipliers): (&[f64], &[f64]),
-        gradient: &mut [f64],
-    ) {
+        nodes: &[Linearisation],
+        gradient: &[f64],
+        weights: &[impl AsRef<[f64]>],
+    ) -> Vec<f64> {
         let (n, width) = (self.n, self.n + self.m);
-        let own = (0..n).zip(weights).chain((width..).zip(multipliers));
-        for (r, weight) in own {
-            let entries = rows.row(r).filter(|(c, _)| (n..width).contains(c));
-            entries.for_each(|(c, value)| gradient[c] -= self.dt * weight * value);
+        let mut terms: Vec<f64> = gradient.iter().map(|v| v.abs()).collect();
+        let (mut back, mut multipliers) = (vec![0.0; n], Vector::new());
+        for ((node, own), weights) in nodes.iter().zip(&self.nodes).zip(weights) {
+            own.rates_back(weights.as_ref(), &mut back, &mut multipliers);
+            let rows = (0..n).zip(weights.as_ref());
+            for (r, weight) in rows.chain((width..).zip(&multipliers)) {
+                let entries = node.rows().row(r).filter(|(c, _)| *c < width);
+                entries.for_each(|(c, value)| terms[c] += (self.dt * weight * value).abs());
+            }
         }
+        terms
     }
 
     /// The full matrix, with the multipliers eliminated; `None` where they have no solution. Its rows, and its unknowns, are divided by
@@ -353,6 +503,7 @@ impl Collocation {
             eliminated(node.rows(), (n, m, n_multipliers), slopes)?;
         }
         self.units = units(&all, (n, m, dt), measured);
+        self.scales.clear();
         for (i, slopes) in all.chunks_exact(size).enumerate() {
             let sum: f64 = WEIGHTS[i].iter().sum();
             for r in 0..n {
@@ -368,12 +519,32 @@ impl Collocation {
                 (0..STAGES * n).for_each(|k| matrix[(i * n + r, k)] *= scale);
                 let by_parameters = row[n..].iter().enumerate();
                 let by_parameters = by_parameters.filter(|(_, slope)| **slope != 0.0);
-                let by_parameters = by_parameters.map(|(p, slope)| (n + p, scale * dt * slope));
-                let own = [(r, scale * sum)];
-                self.right.push_row(own.into_iter().chain(by_parameters));
+                let by_parameters = by_parameters.map(|(p, slope)| (n + p, dt * slope));
+                self.right
+                    .push_row([(r, sum)].into_iter().chain(by_parameters));
+                self.scales.push(scale);
             }
         }
         Some(Elimination::of(matrix))
+    }
+
+    /// The right-hand side of the equations with the multipliers as unknowns.
+    fn take_right(&mut self, nodes: &[Linearisation]) {
+        let (n, m, dt) = (self.n, self.m, self.dt);
+        let is_parameter = |(column, _): &(usize, f64)| (n..n + m).contains(column);
+        self.right.clear(n + m);
+        for (node, weights) in nodes.iter().zip(&WEIGHTS) {
+            let (rows, sum) = (node.rows(), weights.iter().sum());
+            for r in 0..n {
+                let shares = rows.row(r).filter(is_parameter);
+                let shares = shares.map(|(c, value)| (c, -dt * value));
+                self.right.push_row([(r, sum)].into_iter().chain(shares));
+            }
+            for r in n + m..rows.n_rows() {
+                let shares = rows.row(r).filter(is_parameter);
+                self.right.push_row(shares.map(|(c, value)| (c, -value)));
+            }
+        }
     }
 
     /// The matrix with the multipliers as unknowns: is it regular?
@@ -381,17 +552,15 @@ impl Collocation {
         let (n, m, dt) = (self.n, self.m, self.dt);
         let n_multipliers = nodes[0].rows().n_rows() - n - m;
         let block = n + n_multipliers;
-        self.right.clear(n + m);
+        self.take_right(nodes);
         let mut matrix = SparseRows::new(STAGES * block);
         for (i, node) in nodes.iter().enumerate() {
-            let sum: f64 = WEIGHTS[i].iter().sum();
             let (rows, start) = (node.rows(), i * block);
             let unknown = |(column, value): (usize, f64)| match column {
                 column if column < n => Some((start + column, value)),
                 column if column >= n + m => Some((start + column - m, value)),
                 _ => None,
             };
-            let is_parameter = |(column, _): &(usize, f64)| (n..n + m).contains(column);
             for r in 0..n {
                 let mut own = [0.0; STAGES];
                 own[i] = rows.diagonal(r) * dt;
@@ -402,14 +571,9 @@ impl Collocation {
                 row.extend(others.filter_map(unknown).map(|(c, v)| (c, dt * v)));
                 row.sort_unstable_by_key(|entry| entry.0);
                 matrix.push_row(row);
-                let shares = rows.row(r).filter(is_parameter);
-                let shares = shares.map(|(c, value)| (c, -dt * value));
-                self.right.push_row([(r, sum)].into_iter().chain(shares));
             }
             for c in 0..n_multipliers {
                 matrix.push_row(rows.row(n + m + c).filter_map(unknown));
-                let shares = rows.row(n + m + c).filter(is_parameter);
-                self.right.push_row(shares.map(|(c, value)| (c, -value)));
             }
         }
         if is_pulled_back {
@@ -492,38 +656,32 @@ impl Node {
 
     /// The rates of a change, with what the parameters add to each row.
     fn rates(&self, change: &[f64], by_parameters: &[f64], out: &mut [f64]) {
-        let n = change.len();
-        let l = self.rows.n_rows() - n;
-        let mut all = change.to_vec();
-        all.resize(n + l, 0.0);
-        if l > 0 {
-            let known = (n..n + l).map(|k| -self.rows.dot(k, &all) - by_parameters[k]);
-            let known: Vector = known.collect();
-            all[n..].copy_from_slice(&self.multipliers.solve(&known));
-        }
+        let all = self.with_multipliers(change, by_parameters);
         for (r, out) in out.iter_mut().enumerate() {
             *out = -self.rows.dot(r, &all) - by_parameters[r];
         }
     }
 
-    /// Adds the sizes of what the states, and the multipliers that follow from them, have in the rates over a length of time.
-    fn add_terms(&self, change: &[f64], dt: f64, terms: &mut [f64]) {
-        let (n, n_rows) = (change.len(), self.rows.n_rows());
-        let mut all = change.to_vec();
-        all.resize(n_rows, 0.0);
-        let known: Vector = (n..n_rows).map(|k| self.rows.dot(k, &all)).collect();
-        all[n..].copy_from_slice(&self.multipliers.solve(&known));
+    /// Adds the sizes of what the states, the parameters, and the multipliers that follow from them, have in the rates over a length of
+    /// time.
+    fn add_terms(&self, change: &[f64], by_parameters: &[f64], dt: f64, terms: &mut [f64]) {
+        let all = self.with_multipliers(change, by_parameters);
         for (r, terms) in terms.iter_mut().enumerate() {
-            *terms += dt.abs() * self.rows.magnitude(r, &all);
+            *terms += dt.abs() * (self.rows.magnitude(r, &all) + by_parameters[r].abs());
         }
     }
 
-    /// The same of the transpose.
-    fn add_terms_back(&self, weights: &[f64], dt: f64, terms: &mut [f64]) {
-        for (r, weight) in weights.iter().enumerate() {
-            let entries = self.rows.row(r).filter(|(c, _)| *c < weights.len());
-            entries.for_each(|(c, value)| terms[c] += (dt * weight * value).abs());
+    /// A change with those of the multipliers behind it.
+    fn with_multipliers(&self, change: &[f64], by_parameters: &[f64]) -> Vec<f64> {
+        let (n, n_rows) = (change.len(), self.rows.n_rows());
+        let mut all = change.to_vec();
+        all.resize(n_rows, 0.0);
+        if n_rows > n {
+            let known = (n..n_rows).map(|k| -self.rows.dot(k, &all) - by_parameters[k]);
+            let known: Vector = known.collect();
+            all[n..].copy_from_slice(&self.multipliers.solve(&known));
         }
+        all
     }
 
     /// The transpose of [`rates`](Self::rates), and the weights of the equations of the multipliers.
@@ -548,6 +706,18 @@ impl Node {
             }
         }
     }
+}
+
+/// Multiplies values by factors.
+fn scale(values: &mut [f64], factors: &[f64]) {
+    let pairs = values.iter_mut().zip(factors);
+    pairs.for_each(|(value, factor)| *value *= factor);
+}
+
+/// Raises sizes to those of these values.
+fn raise(sizes: &mut [f64], values: &[f64]) {
+    let pairs = sizes.iter_mut().zip(values);
+    pairs.for_each(|(size, value)| *size = size.max(value.abs()));
 }
 
 /// U_i = sum_j C_ji V_j.

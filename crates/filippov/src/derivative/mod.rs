@@ -19,6 +19,7 @@ mod extended;
 mod forms;
 mod held;
 mod instant;
+mod lengths;
 mod limit;
 mod one_sided;
 mod orthonormal;

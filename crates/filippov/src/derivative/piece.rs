@@ -9,6 +9,7 @@ use super::change::{Change, Row, Rows};
 use super::collocation::{fastest, operations, Collocation};
 use super::extended::Extended;
 use super::forms::{add, form_by_differences, is_known, pairs, Moved, Second};
+use super::lengths::Lengths;
 use super::orthonormal::{orthonormal, Choice};
 use super::radau::{INTEGRALS, NODES, STAGES};
 use super::series::{Carried, ChangeSeries, Changes};
@@ -29,16 +30,8 @@ use crate::vectors::dot;
 const SHORTEST: f64 = 0.25;
 const SHORTEST_OF_PAIRS: f64 = 1e-3;
 
-/// Stiff steps are not divided into more than so many parts.
-const MOST_PARTS: f64 = 16.0;
-
 /// So many iterations at most for the state at the end of a part.
 const MOST_ITERATIONS: usize = 60;
-
-/// How long a part of a step may be, in units of 1 / |Df|: one of length z has the relative error 7e-15 z^14.
-fn longest_part(rtol: f64) -> f64 {
-    (rtol / 1e-12).powf(1.0 / 14.0).max(1.0)
-}
 
 /// What a motion follows from, beside its mode and discrete states.
 #[derive(Clone)]
@@ -113,8 +106,6 @@ pub(super) struct Piece<'a> {
     rtol: f64,
     /// The order of the series.
     order: usize,
-    /// How long a part of a step may be, in units of 1 / |Df|.
-    longest: f64,
     collocation: Collocation,
     /// The derivatives of the field at the nodes of a part.
     nodes: Vec<Linearisation>,
@@ -156,6 +147,7 @@ impl<'a> Piece<'a> {
         };
         let linearisations = system.linearisations().filter(|_| by_graph);
         let jacobian = linearisations.and_then(|l| l.motion_jacobian(&sliding));
+        let by_differences = jacobian.is_none();
         let z = extended.state(&vec![0.0; extended.n]);
         Piece {
             extended,
@@ -174,8 +166,11 @@ impl<'a> Piece<'a> {
             at_end: Vec::new(),
             rtol: around.rtol,
             order: around.order,
-            longest: longest_part(around.rtol),
-            collocation: Collocation::new((extended.n, extended.n_parameters()), around.rtol),
+            collocation: Collocation::new(
+                (extended.n, extended.n_parameters()),
+                around.rtol,
+                by_differences,
+            ),
             nodes: Vec::new(),
             rates: vec![0.0; z.len()],
             point: z.into_vec(),
@@ -242,10 +237,12 @@ impl<'a> Piece<'a> {
         if self.advance_by_series(&mut path, (t0, t1), columns)? {
             return Ok(());
         }
-        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
-        for part in 0..parts {
-            self.take(&mut path, t0 + part as f64 * dt, dt)?;
-            self.collocation.carry(&self.nodes, dt, columns);
+        let mut lengths = self.lengths(&mut path, (t0, t1))?;
+        while let Some((dt, left)) = lengths.next() {
+            self.take(&mut path, t1 - left, dt)?;
+            if lengths.takes(self.collocation.carry(&self.nodes, dt, columns)) {
+                self.collocation.accept(&mut *columns);
+            }
         }
         Ok(())
     }
@@ -315,12 +312,14 @@ impl<'a> Piece<'a> {
         &mut self,
         mut path: impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
         (t0, t1): (f64, f64),
-        gradient: &mut [f64],
+        gradient: &mut Vec<f64>,
     ) -> Result<(), FieldError> {
-        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
-        for part in (0..parts).rev() {
-            self.take(&mut path, t0 + part as f64 * dt, dt)?;
-            self.collocation.pull_back(&self.nodes, dt, gradient);
+        let mut lengths = self.lengths(&mut path, (t0, t1))?;
+        while let Some((dt, left)) = lengths.next() {
+            self.take(&mut path, t0 + left - dt, dt)?;
+            if lengths.takes(self.collocation.pull_back(&self.nodes, dt, gradient)) {
+                self.collocation.accept([&mut *gradient]);
+            }
         }
         Ok(())
     }
@@ -383,26 +382,36 @@ impl<'a> Piece<'a> {
             .iter()
             .map(|column| Moved::of_state(column))
             .collect();
-        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
-        for part in 0..parts {
-            let start = t0 + part as f64 * dt;
+        let size = self.point.len();
+        let mut lengths = self.lengths(&mut path, (t0, t1))?;
+        while let Some((dt, left)) = lengths.next() {
+            let start = t1 - left;
             self.take(&mut path, start, dt)?;
+            // The changes, and the mixed ones behind them.
+            let mixed = second.pairs.iter().map(|mixed| {
+                let mut mixed = mixed.clone();
+                mixed.resize(size, 0.0);
+                mixed
+            });
+            let first = changes.iter().map(|change| change.z.clone());
+            let mut all: Vec<Vec<f64>> = first.chain(mixed).collect();
+            if !lengths.takes(self.collocation.carry(&self.nodes, dt, &all)) {
+                continue;
+            }
+            self.collocation.accept(&mut all);
             path(start, &mut self.point[..n])?;
             let z = self.point.clone();
-            let all = pairs(columns.len()).zip(&mut second.pairs);
-            for ((a, b), mixed) in all.filter(|(_, mixed)| is_known(mixed)) {
+            let (first, carried) = all.split_at(changes.len());
+            let pairs = pairs(columns.len()).zip(&mut second.pairs).zip(carried);
+            for (((a, b), mixed), carried) in pairs.filter(|((_, mixed), _)| is_known(mixed)) {
                 let along = (&changes[a], &changes[b]);
                 let end = |t: f64, z: &[f64]| self.end_of(t, dt, z);
                 let bend = form_by_differences(end, (start, &z), along)?;
-                let mut carried = [mixed.clone()];
-                carried[0].resize(z.len(), 0.0);
-                self.collocation.carry(&self.nodes, dt, &mut carried);
-                mixed.copy_from_slice(&carried[0][..n]);
+                mixed.copy_from_slice(&carried[..n]);
                 add(mixed, 1.0, &bend);
             }
-            for change in &mut changes {
-                let column = std::slice::from_mut(&mut change.z);
-                self.collocation.carry(&self.nodes, dt, column);
+            for (change, first) in changes.iter_mut().zip(first) {
+                change.z.copy_from_slice(first);
             }
         }
         Ok(())
@@ -473,20 +482,18 @@ impl<'a> Piece<'a> {
         self.extended.system.gradient(j, &self.at(t, z), out)
     }
 
-    /// Into how many parts a step is divided, and their length.
-    fn parts(
+    /// How a step is divided into parts.
+    fn lengths(
         &mut self,
         path: &mut impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
         (t0, t1): (f64, f64),
-    ) -> Result<(usize, f64), FieldError> {
+    ) -> Result<Lengths, FieldError> {
         let n = self.extended.n;
         path(0.5 * (t0 + t1), &mut self.point[..n])?;
         self.slopes(0, 0.5 * (t0 + t1))?;
         let fastest = fastest(self.nodes[0].rows(), (n, self.point.len() - n));
-        // NaN becomes one part, and stays NaN.
-        let parts = ((t1 - t0) * fastest / self.longest).ceil();
-        let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
-        Ok((parts as usize, (t1 - t0) / parts))
+        let by_differences = self.jacobian.is_none();
+        Ok(Lengths::new(t1 - t0, fastest, self.rtol, by_differences))
     }
 
     /// Takes the derivatives of the field at the nodes of a part.

@@ -84,6 +84,62 @@ pub(super) const WEIGHTS: [[f64; STAGES]; STAGES] = [
     ],
 ];
 
+/// The two highest coefficients of the polynomial through values at the nodes, by Legendre polynomials: the weights of integrals
+/// dt w_j f(t_j) over the part. Quadrature by the last row of [`INTEGRALS`] is exact for their products.
+pub(super) const HIGHEST: [[f64; STAGES]; 2] = [legendre(5), legendre(6)];
+
+/// The same for dt Y', by the differences Y_j - Y_0.
+pub(super) const HIGHEST_RATES: [[f64; STAGES]; 2] = [rates(HIGHEST[0]), rates(HIGHEST[1])];
+
+/// The same for dt A^T U / w of the transposed equations without the gradient at the end, by U_i.
+pub(super) const HIGHEST_BACK: [[f64; STAGES]; 2] = [back(HIGHEST[0]), back(HIGHEST[1])];
+
+/// A Legendre polynomial on the interval from 0 to 1, divided by the integral of its square, at the nodes.
+const fn legendre(degree: u32) -> [f64; STAGES] {
+    let mut out = [0.0; STAGES];
+    let mut i = 0;
+    while i < STAGES {
+        let x = 2.0 * NODES[i] - 1.0;
+        let (mut before, mut value, mut k) = (1.0, x, 1);
+        while k < degree {
+            let next = (2 * k + 1) as f64 * x * value - k as f64 * before;
+            (before, value) = (value, next / (k + 1) as f64);
+            k += 1;
+        }
+        out[i] = (2 * degree + 1) as f64 * value;
+        i += 1;
+    }
+    out
+}
+
+const fn rates(highest: [f64; STAGES]) -> [f64; STAGES] {
+    let mut out = [0.0; STAGES];
+    let mut i = 0;
+    while i < STAGES {
+        let mut j = 0;
+        while j < STAGES {
+            out[i] += highest[j] * INTEGRALS[STAGES - 1][j] * WEIGHTS[j][i];
+            j += 1;
+        }
+        i += 1;
+    }
+    out
+}
+
+const fn back(highest: [f64; STAGES]) -> [f64; STAGES] {
+    let mut out = [0.0; STAGES];
+    let mut i = 0;
+    while i < STAGES {
+        let mut j = 0;
+        while j < STAGES {
+            out[i] += WEIGHTS[i][j] * highest[j];
+            j += 1;
+        }
+        i += 1;
+    }
+    out
+}
+
 /// The matrix of the method: Y_i = Y_0 + dt sum_j C_ij Y'_j.
 pub(super) const INTEGRALS: [[f64; STAGES]; STAGES] = [
     [
