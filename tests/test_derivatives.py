@@ -552,6 +552,28 @@ def test_a_name_of_a_state_and_of_a_parameter_is_refused() -> None:
     assert system.solve((0, 1), [1.0, 0.0], wrt="v").wrt == ("v",)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_changes_that_bend_along_a_step_on_which_the_state_is_straight(method: str) -> None:
+    """x1 stays zero, and steps are long. What grows beside it is exp(p G) with G' = 20 / (1 + 400 (t - 1)^2)."""
+
+    def beside_a_peak(t: float, x: Any, p: float) -> Any:
+        return [1.0, p * x[1] * 20 / (1 + 400 * (x[0] - 1) ** 2)]
+
+    system = fl.System(beside_a_peak, n=2, params={"p": 1.0})
+    run: Any = {"t_span": (0, 4), "y0": [0.0, 0.0], "method": method, "rtol": 1e-10, "atol": 1e-12}
+    total = np.arctan(60) + np.arctan(20)
+    sol = system.solve(wrt=["y0", "p"], order=2, **run)
+    assert sol.derivative()[1, 1] == pytest.approx(np.exp(total), rel=1e-9)
+    assert sol.derivative(order=2)[1, 1, 2] == pytest.approx(total * np.exp(total), rel=1e-9)
+    _, slopes = fl.gradient(system, terminal=lambda t, x: x[1], wrt=["y0"], **run)
+    assert slopes["x[1]"] == pytest.approx(np.exp(total), rel=1e-9)
+    # The integral of exp(G) over the run, by quadrature of Gauss.
+    times, weights = np.polynomial.legendre.leggauss(2000)
+    grown = np.exp(np.arctan(20 * (2 * times + 1)) + np.arctan(20))
+    _, slopes = fl.gradient(system, running=lambda t, x: x[1], wrt=["y0"], **run)
+    assert slopes["x[1]"] == pytest.approx(2 * weights @ grown, rel=1e-9)
+
+
 @pytest.mark.parametrize("first", range(0, 160, 40))
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_random_systems_against_differences(first: int) -> None:
@@ -577,6 +599,7 @@ def test_random_systems_against_differences(first: int) -> None:
         9251445,  # a start at the threshold of a law with memory
         9255107,  # difference quotients of two lengths that are near by chance
         9252182,  # changes that are zero but for rounding while two surfaces are slid on
+        505402,  # a change that bends along a step on which the state is almost straight
     ],
 )
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")

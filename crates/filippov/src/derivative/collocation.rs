@@ -25,8 +25,10 @@ fn error_by([before, last]: [f64; 2]) -> f64 {
     0.03 * highest * highest
 }
 
-/// Values below this share of the largest are not looked at where the derivatives of the field are differences.
-const SHARE_BY_DIFFERENCES: f64 = 1e-4;
+/// A value below this share of the largest counts as one of this size: what rounding leaves of a zero looks rough, and so does all
+/// that follows from it. Derivatives of the field by differences are known to fewer digits.
+const LEAST: f64 = 1e-8;
+const LEAST_BY_DIFFERENCES: f64 = 1e-4;
 
 /// The fastest rate of a sliding motion is seen in so many applications of its derivative.
 const FASTEST_POWER: u32 = 4;
@@ -140,10 +142,9 @@ impl Collocation {
             m,
             rest: (1e-3 * rtol).max(4.0 * EPS),
             allowed: allowed(rtol),
-            least: if by_differences {
-                SHARE_BY_DIFFERENCES
-            } else {
-                0.0
+            least: match by_differences {
+                true => LEAST_BY_DIFFERENCES,
+                false => LEAST,
             },
             dt: f64::NAN,
             way: Way::Sparse(false),
@@ -215,7 +216,7 @@ impl Collocation {
         for stage in stages {
             raise(&mut sizes, stage);
         }
-        let error = self.error_of(&highest, &mut sizes);
+        let error = self.error_of(&highest, &sizes);
         if error.is_nan() || error <= self.allowed {
             return error;
         }
@@ -228,18 +229,15 @@ impl Collocation {
             self.nodes[i].add_terms(stage, &by_parameters, dt, &mut terms);
         }
         raise(&mut sizes, &terms);
-        self.error_of(&highest, &mut sizes)
+        self.error_of(&highest, &sizes)
     }
 
     /// The largest error of values of these sizes.
-    fn error_of(&self, highest: &[[f64; 2]], sizes: &mut [f64]) -> f64 {
-        if self.least > 0.0 {
-            let largest = sizes.iter().fold(0.0_f64, |most, size| size.max(most));
-            let sizes = sizes.iter_mut();
-            sizes.for_each(|size| *size = size.max(self.least * largest));
-        }
-        let pairs = highest.iter().zip(sizes).filter(|(_, size)| **size > 0.0);
-        let errors = pairs.map(|(highest, size)| error_by(highest.map(|c| c / *size)));
+    fn error_of(&self, highest: &[[f64; 2]], sizes: &[f64]) -> f64 {
+        let largest = sizes.iter().fold(0.0_f64, |most, size| size.max(most));
+        let sizes = sizes.iter().map(|size| size.max(self.least * largest));
+        let pairs = highest.iter().zip(sizes).filter(|(_, size)| *size > 0.0);
+        let errors = pairs.map(|(highest, size)| error_by(highest.map(|c| c / size)));
         errors.fold(0.0, f64::max)
     }
 
@@ -316,14 +314,14 @@ impl Collocation {
         let highest: Vec<[f64; 2]> = highest.collect();
         let mut sizes: Vec<f64> = gradient.iter().map(|v| v.abs()).collect();
         raise(&mut sizes, end);
-        let error = self.error_of(&highest, &mut sizes);
+        let error = self.error_of(&highest, &sizes);
         if error.is_nan() || error <= self.allowed {
             return error;
         }
         self.look_at(nodes);
         let terms = self.terms_back(nodes, gradient, weights);
         raise(&mut sizes, &terms);
-        self.error_of(&highest, &mut sizes)
+        self.error_of(&highest, &sizes)
     }
 
     /// Takes what was found by [`carry`](Self::carry) or [`pull_back`](Self::pull_back).

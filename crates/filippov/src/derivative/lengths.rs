@@ -3,7 +3,7 @@
 /// A step has so many parts at first at most: what is stiff is damped.
 const MOST_AT_FIRST: f64 = 16.0;
 
-/// No part is shorter than this share of a step. What changes faster has died out behind such a part, or is a singular point.
+/// No part is shorter than this share of a step. What changes faster is a transient, which the method damps, or a singular point.
 const LEAST: f64 = 1.0 / 1024.0;
 /// The same where derivatives are differences: these are not known to all digits, and what is left of a value that is zero looks rough.
 const LEAST_OF_DIFFERENCES: f64 = 1.0 / 16.0;

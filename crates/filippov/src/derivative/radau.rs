@@ -84,14 +84,15 @@ pub(super) const WEIGHTS: [[f64; STAGES]; STAGES] = [
     ],
 ];
 
-/// The two highest coefficients of the polynomial through values at the nodes, by Legendre polynomials: the weights of integrals
-/// dt w_j f(t_j) over the part. Quadrature by the last row of [`INTEGRALS`] is exact for their products.
+/// What makes of the shares w_j f(t_j) of an integral over a part, at the nodes, the two highest coefficients of the polynomial through the
+/// values f(t_j), those of the Legendre polynomials of degree 5 and 6. This quadrature is exact for the products of these polynomials.
 pub(super) const HIGHEST: [[f64; STAGES]; 2] = [legendre(5), legendre(6)];
 
-/// The same for dt Y', by the differences Y_j - Y_0.
+/// What makes of the differences Y_j - Y_0 the two highest coefficients of dt Y'.
 pub(super) const HIGHEST_RATES: [[f64; STAGES]; 2] = [rates(HIGHEST[0]), rates(HIGHEST[1])];
 
-/// The same for dt A^T U / w of the transposed equations without the gradient at the end, by U_i.
+/// What makes of U, w times the gradient at the nodes, the two highest coefficients of dt Df^T U / w, where the part of the gradient at
+/// the end has yet to be taken off.
 pub(super) const HIGHEST_BACK: [[f64; STAGES]; 2] = [back(HIGHEST[0]), back(HIGHEST[1])];
 
 /// A Legendre polynomial on the interval from 0 to 1, divided by the integral of its square, at the nodes.
