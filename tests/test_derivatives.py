@@ -552,6 +552,30 @@ def test_a_name_of_a_state_and_of_a_parameter_is_refused() -> None:
     assert system.solve((0, 1), [1.0, 0.0], wrt="v").wrt == ("v",)
 
 
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-11])
+def test_the_time_of_a_touch_has_no_derivative(tolerance: float) -> None:
+    """x = a sin t touches 1 for a = 1, and passes it beside that; the derivative of its time is that of arcsin(1 / a)."""
+    system = fl.System(lambda t, x, a: [a * np.cos(t)], n=1, params={"a": 1.0})
+
+    def at_one(t: float, x: Any) -> Any:
+        return x[0] - 1.0
+
+    options: dict[str, Any] = {"rtol": tolerance, "atol": 1e-3 * tolerance}
+    sol = system.solve((0, 2), [0.0], events=at_one, wrt="a", **options)
+    assert np.size(sol.t_events[0]) >= 1
+    assert np.isnan(sol.dt_events[0]).all()
+    costs: Any = {"instants": [(at_one, lambda t, x: t)]}
+    with pytest.warns(fl.FilippovWarning, match=r"at t = 1\.57.*touches zero, and does not pass it"):
+        _, slopes = fl.gradient(system, (0, 2), [0.0], wrt="a", **costs, **options)
+    assert np.isnan(slopes["a"])
+    a = 1.0 + 10 * tolerance
+    exact = -1 / (a * np.sqrt(a * a - 1))
+    sol = system.solve((0, np.pi / 2), [0.0], a=a, events=at_one, wrt="a", **options)
+    assert sol.dt_events[0][0, 0] == pytest.approx(exact, rel=0.1)
+    _, slopes = fl.gradient(system, (0, np.pi / 2), [0.0], {"a": a}, wrt="a", **costs, **options)
+    assert slopes["a"] == pytest.approx(exact, rel=0.1)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_changes_that_bend_along_a_step_on_which_the_state_is_straight(method: str) -> None:
     """x1 stays zero, and steps are long. What grows beside it is exp(p G) with G' = 20 / (1 + 400 (t - 1)^2)."""

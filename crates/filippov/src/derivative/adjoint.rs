@@ -176,6 +176,7 @@ impl Observer for &RefCell<Trail> {
 }
 
 /// Why a term has no gradient.
+const TOUCHES: &str = "the function whose zero it is touches zero, and does not pass it";
 const READS_MULTIPLIERS: &str = "the cost reads signs of surfaces that the motion slides on";
 
 /// A term of a cost: a function of time, state and parameters at one or more instants.
@@ -632,9 +633,21 @@ impl<'w> Walk<'w> {
             _ if before.is_some_and(|instant| zero.is_brought_by(instant.t[0])) => {
                 self.ends_with += moved;
             }
-            _ => add(&mut self.w, -moved / zero.rate, &zero.gradient),
+            _ => {
+                let weights = self.weights();
+                if function.touches(piece, (t, &z), &zero, &weights)? {
+                    self.lost = Some((t, TOUCHES));
+                }
+                add(&mut self.w, -moved / zero.rate, &zero.gradient);
+            }
         }
         Ok(())
+    }
+
+    /// By what time and states are measured.
+    fn weights(&self) -> Weights {
+        let (start, end) = self.run.t_span;
+        Weights::new(start, end - start, self.run.options)
     }
 
     /// Takes the gradient back through an instant.
@@ -647,13 +660,7 @@ impl<'w> Walk<'w> {
     ) -> Result<Option<&'static str>, FieldError> {
         let extended = before.extended;
         let n = extended.n;
-        let options = self.run.options;
-        let weights = Weights {
-            start: self.run.t_span.0,
-            span: self.run.t_span.1 - self.run.t_span.0,
-            rtol: options.rtol,
-            atol: options.atol.clone(),
-        };
+        let weights = self.weights();
         if record.replaces {
             return Ok(Some("accumulation"));
         }

@@ -3,6 +3,7 @@
 use super::event_gradient::EventGradient;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
+use super::instant::Weights;
 use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
 use crate::error::FieldError;
@@ -71,7 +72,8 @@ impl<'r> Differentiated<'r> {
         let Some(columns) = self.columns(t, side)? else {
             return Ok(None);
         };
-        let (path, extended) = (self.path(t, side), self.run.systems.1);
+        let (path, run) = (self.path(t, side), self.run);
+        let extended = run.systems.1;
         let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
@@ -80,10 +82,15 @@ impl<'r> Differentiated<'r> {
         let z = extended.state(&x);
         let zero = function.at_zero(piece, (t, &z))?;
         // Where the function jumps with an instant of the run, it is zero when that comes.
-        let mut instants = self.run.found.instants.iter();
+        let mut instants = run.found.instants.iter();
         let instant = instants.find(|instant| zero.is_brought_by(instant.t));
         if let Some(instant) = instant {
             return Ok(Some(instant.dt.clone()));
+        }
+        let start = run.found.t.first().copied().unwrap_or(t);
+        let weights = Weights::new(start, run.solution.t_last - start, run.options);
+        if function.touches(piece, (t, &z), &zero, &weights)? {
+            return Ok(Some(vec![f64::NAN; columns.len()]));
         }
         let shift = |column: &Vec<f64>| -dot(&zero.gradient, column) / zero.rate;
         Ok(Some(columns.iter().map(shift).collect()))

@@ -1,11 +1,15 @@
 //! Functions of a user at a point of a motion: their values and derivatives, and what fixes the times of their zeros.
 
 use super::extended::extended_system;
+use super::instant::Weights;
 use super::piece::Piece;
 use crate::error::{Error, FieldError};
 use crate::system::{sides_where, PiecewiseSystem, Rules, Setting, SignStructure, TracedSystem};
-use crate::tolerances::{AT_SIDE, ROUNDING};
+use crate::tolerances::{AT_SIDE, EPS, ROUNDING};
 use crate::vectors::dot;
+
+/// A function that goes beyond zero by less than this share of the tolerance touches it.
+const TOUCHES: f64 = 0.1;
 
 /// The gradient of a function by time, states and parameters.
 pub struct EventGradient {
@@ -32,6 +36,8 @@ pub(super) struct ZeroOf {
     pub rate: f64,
     /// Its derivatives by the extended state.
     pub gradient: Vec<f64>,
+    /// The sign whose function it is, if it is not the function itself.
+    inner: Option<usize>,
 }
 
 impl ZeroOf {
@@ -140,7 +146,7 @@ impl EventGradient {
         (t, z): (f64, &[f64]),
     ) -> Result<ZeroOf, FieldError> {
         let rates = piece.rates(t, z)?;
-        let zero_of = |value: f64, time: f64, gradient: Vec<f64>| {
+        let zero_of = |inner: Option<usize>, value: f64, time: f64, gradient: Vec<f64>| {
             let rate = time + dot(&gradient, &rates);
             let away = time_to_zero(value, rate);
             ZeroOf {
@@ -148,6 +154,7 @@ impl EventGradient {
                 away,
                 rate,
                 gradient,
+                inner,
             }
         };
         let Some(Slopes {
@@ -156,9 +163,10 @@ impl EventGradient {
             gradient,
         }) = self.on(piece, (t, z))?
         else {
-            return Ok(zero_of(f64::NAN, f64::NAN, vec![f64::NAN; z.len()]));
+            let gradient = vec![f64::NAN; z.len()];
+            return Ok(zero_of(None, f64::NAN, f64::NAN, gradient));
         };
-        let mut found = zero_of(value, time, gradient);
+        let mut found = zero_of(None, value, time, gradient);
         let signs = self.signs(piece, (t, z))?;
         let system = &self.extended;
         let mut h = vec![0.0; system.n_surfaces()];
@@ -173,12 +181,55 @@ impl EventGradient {
             let mut gradient = vec![0.0; z.len()];
             let here = Setting::new(&signs, &piece.q).at(t, z);
             let time = system.gradient(j, &here, &mut gradient)?;
-            let inner = zero_of(h[j], time, gradient);
+            let inner = zero_of(Some(j), h[j], time, gradient);
             if inner.away < found.away {
                 found = inner;
             }
         }
         Ok(found)
+    }
+
+    /// Does what fixes the time of a zero turn back there, as far as the tolerance tells? By parabola it goes beyond zero by
+    /// rate^2 / (2 |rate'|). The time of a touch has no derivative.
+    pub(super) fn touches(
+        &self,
+        piece: &mut Piece,
+        (t, z): (f64, &[f64]),
+        zero: &ZeroOf,
+        weights: &Weights,
+    ) -> Result<bool, FieldError> {
+        let (n, rates) = (piece.extended.n, piece.rates(t, z)?);
+        let (x, gradient) = (&z[..n], &zero.gradient[..n]);
+        let unit = weights.time_of_change(t, x, &rates[..n]);
+        let tolerance = weights.rtol * weights.length(x, (0.0, gradient), unit);
+        let by_parameters = zero.gradient[n..].iter().zip(&z[n..]);
+        let rounding = by_parameters.map(|(g, p)| EPS * (g * (1.0 + p.abs())).abs());
+        // The motion comes from a moment before.
+        let moment = EPS.cbrt() * unit;
+        let before: Vec<f64> = z.iter().zip(&rates).map(|(z, f)| z - moment * f).collect();
+        let rate_before = self.rate(piece, (t - moment, &before), zero.inner)?;
+        let bend = ((zero.rate - rate_before) / moment).abs();
+        let beyond = zero.rate * zero.rate / (2.0 * bend);
+        Ok(beyond <= TOUCHES * tolerance + rounding.sum::<f64>())
+    }
+
+    /// How fast the function changes along the motion, or that of a sign inside of it.
+    fn rate(
+        &self,
+        piece: &mut Piece,
+        (t, z): (f64, &[f64]),
+        inner: Option<usize>,
+    ) -> Result<f64, FieldError> {
+        let rates = piece.rates(t, z)?;
+        let Some(j) = inner else {
+            let found = self.on(piece, (t, z))?;
+            return Ok(found.map_or(f64::NAN, |s| s.time + dot(&s.gradient, &rates)));
+        };
+        let signs = self.signs(piece, (t, z))?;
+        let mut gradient = vec![0.0; z.len()];
+        let here = Setting::new(&signs, &piece.q).at(t, z);
+        let time = self.extended.gradient(j, &here, &mut gradient)?;
+        Ok(time + dot(&gradient, &rates))
     }
 }
 

@@ -8,6 +8,7 @@ use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField, RootEnd};
+use crate::options::Options;
 use crate::record::InstantRecord;
 use crate::system::{Act, PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
@@ -57,13 +58,23 @@ pub(super) struct Weights {
 }
 
 impl Weights {
+    /// Those of a run of this length from a time on.
+    pub fn new(start: f64, span: f64, options: &Options) -> Self {
+        Weights {
+            start,
+            span,
+            rtol: options.rtol,
+            atol: options.atol.clone(),
+        }
+    }
+
     fn of(&self, i: usize, x: f64) -> f64 {
         let atol = self.atol.get(i).or(self.atol.first()).copied();
         x.abs() + atol.unwrap_or(0.0) / self.rtol
     }
 
     /// The length of a gradient: how much a function changes if the time does so by a unit, and states by their size.
-    fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), unit: f64) -> f64 {
+    pub fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), unit: f64) -> f64 {
         let pairs = x.iter().zip(gradient).enumerate();
         let by_state = pairs.map(|(i, (x, g))| (g * self.of(i, *x)).powi(2));
         ((by_time * unit).powi(2) + by_state.sum::<f64>()).sqrt()
@@ -78,7 +89,7 @@ impl Weights {
     }
 
     /// In what time states change by their size; of a motion at rest, the time until then. However long the run was meant to be.
-    fn time_of_change(&self, t: f64, x: &[f64], field: &[f64]) -> f64 {
+    pub fn time_of_change(&self, t: f64, x: &[f64], field: &[f64]) -> f64 {
         let so_far = if t > self.start {
             t - self.start
         } else {

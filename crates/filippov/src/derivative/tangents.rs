@@ -155,12 +155,7 @@ impl<'a> Tangents<'a> {
     ) -> Self {
         Tangents {
             around: Surroundings::at_start(extended, impacts, options),
-            weights: Weights {
-                start: f64::INFINITY,
-                span,
-                rtol: options.rtol,
-                atol: options.atol.clone(),
-            },
+            weights: Weights::new(f64::INFINITY, span, options),
             columns: Vec::new(),
             columns_before: Vec::new(),
             kept: options.keep,
