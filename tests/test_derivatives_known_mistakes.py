@@ -228,10 +228,10 @@ def test_a_start_at_rest_on_a_surface_where_the_field_of_one_side_vanishes() -> 
         return [-0.95 * x[0] - 1.4 * x[1] + 0.32 * u, -1.4 * x[0] - 0.5 * x[1] - 0.44 * u]
 
     system = fl.System(fun, n=2)
-    with pytest.warns(fl.FilippovWarning, match="starts"):
+    with pytest.warns(fl.FilippovWarning, match="starts on|stays at its end"):
         sol = system.solve((0, 1), [0.0, 0.0], wrt="y0")
     assert "where a multiplier stays at its end" in sol.warnings[1].message
-    with pytest.warns(fl.FilippovWarning, match="starts") as shown:
+    with pytest.warns(fl.FilippovWarning, match="starts on|stays at its end") as shown:
         fl.gradient(system, (0, 1), [0.0, 0.0], terminal=lambda t, y: y[0], wrt="y0")
     assert len(shown) == 2
 
@@ -298,3 +298,23 @@ def test_a_start_of_sliding_of_higher_order() -> None:
     with pytest.warns(fl.FilippovWarning, match="the gradient is NaN"):
         found = fl.gradient(system, (0, 1), [0.0, 0.0], terminal=lambda t, y: y[0], wrt="y0")[1]
     assert np.isnan(list(found.values())).all()
+
+
+PUSHES: dict[str, Any] = {
+    "from the start": lambda t, F: F,
+    "from an instant on": lambda t, F: np.where(t < 1, 0.0, F),
+}
+
+
+@pytest.mark.parametrize("name", PUSHES)
+def test_a_push_as_large_as_the_friction_has_sides(name: str) -> None:
+    """The multiplier is at its end and stays there: with a larger push the body slides, with a smaller one it sticks."""
+    push = PUSHES[name]
+    system = fl.System(lambda t, x, F: [x[1], push(t, F) - np.sign(x[1])], n=2, params={"F": 1.0})
+    with pytest.warns(fl.FilippovWarning, match="slides where a multiplier stays at its end"):
+        sol = system.solve((0, 4), [0.0, 0.0], wrt="F")
+    assert sol.warnings[0].t == (0.0 if name == "from the start" else 1.0)
+    with pytest.warns(fl.FilippovWarning, match="slides where a multiplier stays at its end"):
+        fl.gradient(system, (0, 4), [0.0, 0.0], terminal=lambda t, x: x[0])
+    beside = system.solve((0, 4), [0.0, 0.0], F=0.9, wrt="F")
+    assert not beside.warnings

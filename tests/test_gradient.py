@@ -553,3 +553,34 @@ def test_derivatives_at_no_times() -> None:
     system = fl.System(heater, n=1)
     sol = system.solve((0, 1), [0.3], wrt=["P", "y0"])
     assert sol.derivative([]).shape == (1, 2, 0)
+
+
+KINKS: dict[str, tuple[Any, bool]] = {
+    "kink": (lambda t, x: abs(x[0] - 1.0), True),
+    "jump": (lambda t, x: np.where(x[0] >= 1.0, 2.0, x[0]), True),
+    "staircase": (lambda t, x: np.floor(x[0]), True),
+    "smooth there": (lambda t, x: abs(x[0] - 1.0) ** 3, False),
+    "elsewhere": (lambda t, x: abs(x[0] - 1.1), False),
+}
+
+
+@pytest.mark.parametrize("name", KINKS)
+def test_a_cost_at_its_own_kink_has_the_gradient_of_one_side(name: str) -> None:
+    cost, has_sides = KINKS[name]
+    system = fl.System(lambda t, x, a: [a], n=1, params={"a": 1.0})
+    costs: list[dict[str, Any]] = [{"terminal": cost}, {"instants": [([1.0], cost)]}]
+    for given, end in zip(costs, (1.0, 2.0), strict=True):
+        with warnings.catch_warnings(record=True) as shown:
+            warnings.simplefilter("always")
+            fl.gradient(system, (0, end), [0.0], **given)
+        assert [str(one.message).split(": ")[-1] for one in shown] == [
+            "the gradient is that of one side"
+        ] * has_sides
+
+
+def test_the_kink_of_a_cost_on_which_a_body_sticks_is_none_of_its_gradient() -> None:
+    """The body has stopped: no motion beside it has another velocity."""
+    system = fl.System(lambda t, x, F: [x[1], F - np.sign(x[1])], n=2, params={"F": 0.5})
+    value, slopes = fl.gradient(system, (0, 3), [0.0, 1.0], terminal=lambda t, x: abs(x[1]) + x[0])
+    assert value == pytest.approx(1.0)  # 1 / (2 (1 - F))
+    assert slopes["F"] == pytest.approx(2.0)

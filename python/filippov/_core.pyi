@@ -43,8 +43,9 @@ _Array = npt.NDArray[np.float64]
 
 __version__: str
 
-_Borders = tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, bool, bool]
+_Borders = tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, float | None, bool]
 _Guard = tuple[str, int, int]
+_TermPoint = tuple[int, float, _Array, tuple[float, bool]]
 _Instant = tuple[list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]]
 
 @final
@@ -297,7 +298,7 @@ class Run:
     def kept_instants(self) -> tuple[list[int], list[float], list[_Instant]] | None: ...
     def cost_gradient(
         self, terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]]
-    ) -> tuple[_Array, tuple[float, str] | None, _Borders, list[tuple[int, float, _Array, float]]]: ...
+    ) -> tuple[_Array, tuple[float, str] | None, _Borders, list[_TermPoint]]: ...
     @property
     def warns_of_derivatives(self) -> bool: ...
     def second_derivatives(self, t: _Array | None, left: bool) -> list[_Array]: ...

@@ -42,15 +42,15 @@ pub type SideRow<'py> = (
 );
 
 /// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial
-/// time, does a clock tick there, is a law at its threshold, does a multiplier stay at its end there, and does the run end at an instant
-/// that moves?
+/// time, does a clock tick there, is a law at its threshold, from which time does a multiplier stay at its end, and does the run end at
+/// an instant that moves?
 pub type BordersRow = (
     Vec<usize>,
     Option<(f64, Vec<usize>)>,
     bool,
     bool,
     bool,
-    bool,
+    Option<f64>,
     bool,
 );
 
@@ -62,7 +62,7 @@ pub fn borders_row(borders: &Borders) -> BordersRow {
         borders.starts_at_action,
         borders.starts_at_tick,
         borders.starts_at_threshold,
-        borders.starts_at_end,
+        borders.stays_at_end,
         borders.ends_at_instant,
     )
 }
@@ -195,7 +195,7 @@ type GradientRow = (
     Vec<f64>,
     Option<LostAt>,
     BordersRow,
-    Vec<(usize, f64, Vec<f64>, f64)>,
+    Vec<(usize, f64, Vec<f64>, (f64, bool))>,
 );
 
 /// What a run computed, and its actions.
@@ -371,7 +371,7 @@ impl RunDerivatives {
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
         let points = found.points.into_iter();
         let points = points
-            .map(|point| (point.term, point.t, point.x, point.value))
+            .map(|point| (point.term, point.t, point.x, (point.value, point.has_sides)))
             .collect();
         Ok((entries, found.lost, borders_row(&found.borders), points))
     }

@@ -45,7 +45,7 @@ type GradientRow<'py> = (
     Vector<'py>,
     Option<LostAt>,
     BordersRow,
-    Vec<(usize, f64, Vector<'py>, f64)>,
+    Vec<(usize, f64, Vector<'py>, (f64, bool))>,
 );
 
 type DecisionRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>);

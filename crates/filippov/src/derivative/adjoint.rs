@@ -9,7 +9,7 @@ use std::cell::RefCell;
 
 use super::between::state_at;
 use super::borders::{
-    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_action,
+    differ, is_missed_later, starts_at_threshold, stays_at_end, surfaces_at_action,
     surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
@@ -225,6 +225,8 @@ pub struct TermPoint {
     pub x: Vec<f64>,
     /// The value of the term; NaN if it is not known.
     pub value: f64,
+    /// The term is at a jump or a kink of its own there, and its gradient is that of one side.
+    pub has_sides: bool,
 }
 
 impl CostGradient {
@@ -421,7 +423,9 @@ impl<'w> Walk<'w> {
             let at = (start.t, &z[..]);
             let stays_on;
             (borders.starts_on, stays_on) = surfaces_at_start(&mut piece, at, kinds, &columns)?;
-            borders.starts_at_end = starts_at_end(&mut piece, at, &borders.starts_on, &arrived)?;
+            if stays_at_end(&mut piece, at, &arrived)? {
+                borders.stays_at_end = Some(start.t);
+            }
             borders.starts_at_threshold = starts_at_threshold(&piece, at, kinds)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, kinds)?;
             let end = (self.t_last, &self.x_last[..]);
@@ -517,7 +521,13 @@ impl<'w> Walk<'w> {
             let (t, x) = (record.t[0], record.x[0].to_vec());
             let slopes = self.terms[term].cost.on(before, (t, &z))?;
             let value = slopes.map_or(f64::NAN, |slopes| slopes.value);
-            self.points.push(TermPoint { term, t, x, value });
+            self.points.push(TermPoint {
+                term,
+                t,
+                x,
+                value,
+                has_sides: false,
+            });
         }
         Ok(())
     }
@@ -606,12 +616,16 @@ impl<'w> Walk<'w> {
     ) -> Result<(), FieldError> {
         let extended = self.run.systems.1;
         let z = extended.state(x);
-        let slopes = self.terms[place].cost.on(piece, (t, &z))?;
+        let cost = self.terms[place].cost;
+        let slopes = cost.on(piece, (t, &z))?;
+        // At a zero of a function the cost may have its sides by that function.
+        let has_sides = zero.is_none() && cost.has_sides(piece, (t, &z), &self.weights())?;
         self.points.push(TermPoint {
             term: place,
             t,
             x: x.to_vec(),
             value: slopes.as_ref().map_or(f64::NAN, |slopes| slopes.value),
+            has_sides,
         });
         if self.lost.is_some() {
             return Ok(());
@@ -743,7 +757,7 @@ impl<'w> Walk<'w> {
             })
     }
 
-    /// Notes on which surfaces the state is before and behind actions, for changes of the state before them and of what is asked for.
+    /// Notes on which surfaces the state is before and behind actions, and whether a multiplier stays at its end, for changes of the state before them and of what is asked for.
     fn land(
         &mut self,
         record: &InstantRecord,
@@ -751,7 +765,7 @@ impl<'w> Walk<'w> {
         passages: &[Passage],
     ) -> Result<(), FieldError> {
         let extended = after.extended;
-        let Some(last) = passages.last().filter(|_| !record.acts.is_empty()) else {
+        let Some(last) = passages.last() else {
             return Ok(());
         };
         let states = (0..extended.n).map(Column::State);
@@ -764,6 +778,13 @@ impl<'w> Walk<'w> {
         let mut arrives = false;
         for passage in passages {
             arrives |= !passage.apply(extended.n, &mut columns).is_empty();
+        }
+        let z = extended.state(record.x[1]);
+        if stays_at_end(after, (record.t[1], &z), &columns)? {
+            self.borders.stays_at_end = Some(record.t[1]);
+        }
+        if record.acts.is_empty() {
+            return Ok(());
         }
         self.borders.ends_at_instant |= arrives && record.t[1] == self.t_last;
         let mut landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;

@@ -17,8 +17,8 @@ pub struct Borders {
     /// The first time at which an action finds the state on surfaces at which the sides differ, or puts it there, and these: all
     /// derivatives from there.
     pub lands_on: Option<(f64, Vec<usize>)>,
-    /// The multiplier of such a surface stays at its end at the start, and a changed run slides, or leaves the surface.
-    pub starts_at_end: bool,
+    /// The first time from which the multiplier of a surface slid on stays at its end: a changed run slides, or leaves the surface.
+    pub stays_at_end: Option<f64>,
     /// An action at the initial time, which a run that begins later misses: derivatives by the initial time.
     pub starts_at_action: bool,
     /// A clock ticks at the initial time, before or after which the motion is another: derivatives by the start.
@@ -161,29 +161,29 @@ pub(super) fn surfaces_at_start(
     surfaces_with_sides(piece, at, &moved)
 }
 
-/// Does the multiplier of a surface slid on, at which the sides differ, stay at its end at the start, and change with one of these
-/// columns that have come to the surface?
-pub(super) fn starts_at_end(
+/// Does a multiplier of the surfaces slid on stay at its end from a place on, and change with one of these columns that have come to
+/// the surfaces?
+pub(super) fn stays_at_end(
     piece: &mut Piece,
     (t, z): (f64, &[f64]),
-    starts_on: &[usize],
     columns: &[Vec<f64>],
 ) -> Result<bool, FieldError> {
-    let mut slid_on = starts_on.iter().filter(|j| piece.sliding.contains(j));
-    let Some(&j) = slid_on.next() else {
-        return Ok(false);
-    };
-    if !piece.stays_at_an_end(t, z)? {
+    if piece.sliding.is_empty() || !piece.stays_at_an_end(t, z)? {
         return Ok(false);
     }
-    let Some((_, slopes)) = piece.multiplier_slopes(j, t, z)? else {
-        return Ok(false);
-    };
-    let changes = |column: &Vec<f64>| {
-        let terms = slopes.iter().zip(column).map(|(s, v)| (s * v).abs());
-        dot(&slopes, column).abs() > AT_SIDE * terms.sum::<f64>()
-    };
-    Ok(columns.iter().any(changes))
+    for j in piece.sliding.clone() {
+        let Some((_, slopes)) = piece.multiplier_slopes(j, t, z)? else {
+            continue;
+        };
+        let changes = |column: &Vec<f64>| {
+            let terms = slopes.iter().zip(column).map(|(s, v)| (s * v).abs());
+            dot(&slopes, column).abs() > AT_SIDE * terms.sum::<f64>()
+        };
+        if piece.is_at_an_end(j) && columns.iter().any(changes) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// A surface on which a run stays by itself, as one at rest does, and the sides of it to which the columns lead: 0 if they were on it

@@ -583,6 +583,12 @@ impl<'a> Piece<'a> {
         self.node_signs[j]
     }
 
+    /// Is that multiplier at an end of its interval, or not known?
+    pub fn is_at_an_end(&self, j: usize) -> bool {
+        // NaN too.
+        !((self.node_signs[j].abs() - 1.0).abs() > AT_SIDE)
+    }
+
     /// The derivatives of the multiplier of a surface slid on, by the time and by the extended state; `None` where the graph has
     /// none. NaN where the jumps of the field are tangent to the surfaces: there the equations do not determine the multiplier.
     pub fn multiplier_slopes(

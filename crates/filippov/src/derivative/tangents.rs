@@ -1,7 +1,7 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{
-    differ, is_missed_later, starts_at_end, starts_at_threshold, surfaces_at_action,
+    differ, is_missed_later, starts_at_threshold, stays_at_end, surfaces_at_action,
     surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
@@ -224,7 +224,7 @@ impl<'a> Tangents<'a> {
         self.kept_on = Kept::all(&starts_on, true, &piece, (t, &z), &self.columns)?;
         let quiet = Kept::all(&stays_on, false, &piece, (t, &z), &self.columns)?;
         self.kept_on.extend(quiet);
-        borders.starts_at_end = starts_at_end(&mut piece, (t, &z), &starts_on, &self.columns)?;
+        borders.stays_at_end = stays_at_end(&mut piece, (t, &z), &self.columns)?.then_some(t);
         borders.starts_on = starts_on;
         borders.starts_at_threshold = starts_at_threshold(&piece, (t, &z), &self.kinds)?;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
@@ -474,6 +474,11 @@ impl<'a> Tangents<'a> {
                     .into_iter()
                     .for_each(|lost| self.lose(found.t, lost));
                 self.keep_instant(found);
+            }
+            if let (None, None) = (self.found.borders.stays_at_end, self.lost) {
+                let (t, z) = (record.t[1], self.around.extended.state(record.x[1]));
+                let stays = stays_at_end(&mut after, (t, &z), &self.columns)?;
+                self.found.borders.stays_at_end = stays.then_some(t);
             }
         }
         self.put_back(before);
