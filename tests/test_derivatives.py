@@ -554,7 +554,7 @@ def test_a_name_of_a_state_and_of_a_parameter_is_refused() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-11])
 def test_the_time_of_a_touch_has_no_derivative(tolerance: float) -> None:
-    """x = a sin t touches 1 for a = 1, and passes it beside that; the derivative of its time is that of arcsin(1 / a)."""
+    """x = a sin t touches 1 for a = 1, and passes it for larger a, at arcsin(1 / a)."""
     system = fl.System(lambda t, x, a: [a * np.cos(t)], n=1, params={"a": 1.0})
 
     def at_one(t: float, x: Any) -> Any:
@@ -578,7 +578,7 @@ def test_the_time_of_a_touch_has_no_derivative(tolerance: float) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_changes_that_bend_along_a_step_on_which_the_state_is_straight(method: str) -> None:
-    """x1 stays zero, and steps are long. What grows beside it is exp(p G) with G' = 20 / (1 + 400 (t - 1)^2)."""
+    """x1 stays zero, and steps are long. Beside it exp(p G) grows, with G' = 20 / (1 + 400 (t - 1)^2)."""
 
     def beside_a_peak(t: float, x: Any, p: float) -> Any:
         return [1.0, p * x[1] * 20 / (1 + 400 * (x[0] - 1) ** 2)]

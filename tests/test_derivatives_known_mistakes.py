@@ -308,7 +308,7 @@ PUSHES: dict[str, Any] = {
 
 @pytest.mark.parametrize("name", PUSHES)
 def test_a_push_as_large_as_the_friction_has_sides(name: str) -> None:
-    """The multiplier is at its end and stays there: with a larger push the body slides, with a smaller one it sticks."""
+    """The multiplier stays at its end: with a larger push the body slides, with a smaller one it sticks."""
     push = PUSHES[name]
     system = fl.System(lambda t, x, F: [x[1], push(t, F) - np.sign(x[1])], n=2, params={"F": 1.0})
     with pytest.warns(fl.FilippovWarning, match="slides where a multiplier stays at its end"):

@@ -422,8 +422,8 @@ class Solution:
         """Derivatives of the times of every event by the columns of `wrt`, each of shape (k, len(wrt)).
 
         NaN for an event that is called and not traced, and for a zero that an event touches, as far as the
-        tolerance tells: it turns back there, and its time has no derivative. It is a `ModelError` to ask for them of a run without
-        ``wrt=``.
+        tolerance tells: it turns back there, and its time has no derivative. It is a `ModelError` to ask for
+        them of a run without ``wrt=``.
         """
         if not self.wrt or not isinstance(self._run, Run):
             raise ModelError(NO_DERIVATIVES)

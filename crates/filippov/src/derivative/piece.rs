@@ -585,8 +585,8 @@ impl<'a> Piece<'a> {
 
     /// Is that multiplier at an end of its interval, or not known?
     pub fn is_at_an_end(&self, j: usize) -> bool {
-        // NaN too.
-        !((self.node_signs[j].abs() - 1.0).abs() > AT_SIDE)
+        let beyond = self.node_signs[j].abs() - 1.0;
+        beyond.abs() <= AT_SIDE || beyond.is_nan()
     }
 
     /// The derivatives of the multiplier of a surface slid on, by the time and by the extended state; `None` where the graph has
