@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import filippov as fl
@@ -318,3 +319,27 @@ def test_a_push_as_large_as_the_friction_has_sides(name: str) -> None:
         fl.gradient(system, (0, 4), [0.0, 0.0], terminal=lambda t, x: x[0])
     beside = system.solve((0, 4), [0.0, 0.0], F=0.9, wrt="F")
     assert not beside.warnings
+
+
+SAMPLED: dict[str, tuple[Any, bool]] = {
+    "limited": (lambda t, x: np.clip(x[0], -1.0, 1.0), True),
+    "switched": (lambda t, x: np.where(x[0] >= 1.0, 2.0, 0.0), True),
+    "within its limits": (lambda t, x: np.clip(x[0], -2.0, 2.0), False),
+    "smooth where it switches": (lambda t, x: np.where(x[0] >= 1.0, (x[0] - 1) ** 3, 0.0), False),
+}
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_a_sampled_value_at_its_limit_has_sides(name: str) -> None:
+    """x(1) = a, which is just the limit."""
+    value, has_sides = SAMPLED[name]
+    reset = fl.Reset(times=[1.0], set={"u": value})
+    system = fl.System(lambda t, x, u, a: [a + u], n=1, params={"a": 1.0}, discrete={"u": 0.0}, resets=reset)
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        sol = system.solve((0, 2), [0.0], wrt="a")
+        fl.gradient(system, (0, 2), [0.0], terminal=lambda t, x: x[0])
+    assert [one.t for one in sol.warnings] == [1.0] * has_sides
+    messages = [str(one.message) for one in shown]
+    assert all("an action at t = 1 where its map jumps, or has a kink" in text for text in messages)
+    assert len(messages) == 2 * has_sides

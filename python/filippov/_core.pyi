@@ -43,7 +43,9 @@ _Array = npt.NDArray[np.float64]
 
 __version__: str
 
-_Borders = tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, float | None, bool]
+_Borders = tuple[
+    list[int], tuple[float, list[int]] | None, bool, bool, bool, float | None, float | None, bool
+]
 _Guard = tuple[str, int, int]
 _TermPoint = tuple[int, float, _Array, tuple[float, bool]]
 _Instant = tuple[list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]]

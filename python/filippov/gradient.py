@@ -433,9 +433,7 @@ class _Sum:
         for term, t, x, (own, has_sides) in sorted(reversed(points), key=lambda point: point[0]):
             if has_sides:
                 name = self._costs[term][0]
-                warn_user(
-                    [f"{name}: the cost jumps, or has a kink, at its point: the gradient is that of one side"]
-                )
+                warn_user([f"{name}: the cost is at a jump or a kink: the gradient is that of one side"])
             y, held = np.split(x, [len(x) - len(self._names)])
             value += own if np.isfinite(own) else self._value_of(self._costs[term], t, y, held)
         return value, found, lost, borders

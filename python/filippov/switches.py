@@ -653,9 +653,11 @@ _WHY_SECOND_LOST = {
 _MOVED = "the start and by parameters that move the threshold"
 
 # The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; whether an
-# action, a tick or the threshold of a law is at its start; from which time a multiplier stays at its end;
-# whether a switch is at its end.
-Borders: TypeAlias = "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, float | None, bool]"
+# action, a tick or the threshold of a law is at its start; from which time a multiplier stays at its end, and
+# at which one an action is where its map has sides; whether a switch is at its end.
+Borders: TypeAlias = (
+    "tuple[list[int], tuple[float, list[int]] | None, bool, bool, bool, float | None, float | None, bool]"
+)
 
 
 class Border(NamedTuple):
@@ -672,7 +674,7 @@ def borders_of(
     found: Borders, ends_at_given_time: bool, names: Sequence[str], conditions: Sequence[str]
 ) -> list[Border]:
     """Return where the derivatives of a run are those of one side, from what the core and the trace found."""
-    starts_on, lands_on, at_action, at_tick, at_threshold, multiplier_end, ends_at_instant = found
+    starts_on, lands_on, at_action, at_tick, at_threshold, multiplier_end, at_sides, ends_at_instant = found
     borders = []
     left = tuple(names[j] for j in starts_on if j < len(names))
     if left:
@@ -689,6 +691,9 @@ def borders_of(
     if multiplier_end is not None:
         what = f"slides where a multiplier stays at its end, from t = {multiplier_end:.10g} on"
         borders.append(Border(what, "by the start and by parameters", t=multiplier_end))
+    if at_sides is not None:
+        what = f"does an action at t = {at_sides:.10g} where its map jumps, or has a kink"
+        borders.append(Border(what, "by what moves the state there", t=at_sides))
     if at_threshold:
         borders.append(Border("starts at the threshold of a law", f"by {_MOVED}"))
     borders += (Border(f"has parameters at the border {text}", "by these") for text in conditions)

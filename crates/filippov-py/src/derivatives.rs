@@ -42,14 +42,15 @@ pub type SideRow<'py> = (
 );
 
 /// The surfaces on which a run starts; the time of an action that puts it on surfaces, and these; is an action done at the initial
-/// time, does a clock tick there, is a law at its threshold, from which time does a multiplier stay at its end, and does the run end at
-/// an instant that moves?
+/// time, does a clock tick there, is a law at its threshold, from which time does a multiplier stay at its end, at
+/// which time is an action where its map has sides, and does the run end at an instant that moves?
 pub type BordersRow = (
     Vec<usize>,
     Option<(f64, Vec<usize>)>,
     bool,
     bool,
     bool,
+    Option<f64>,
     Option<f64>,
     bool,
 );
@@ -63,6 +64,7 @@ pub fn borders_row(borders: &Borders) -> BordersRow {
         borders.starts_at_tick,
         borders.starts_at_threshold,
         borders.stays_at_end,
+        borders.acts_at_sides,
         borders.ends_at_instant,
     )
 }

@@ -9,7 +9,7 @@ use std::cell::RefCell;
 
 use super::between::state_at;
 use super::borders::{
-    differ, is_missed_later, starts_at_threshold, stays_at_end, surfaces_at_action,
+    differ, is_missed_later, map_has_sides, starts_at_threshold, stays_at_end, surfaces_at_action,
     surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
@@ -757,7 +757,8 @@ impl<'w> Walk<'w> {
             })
     }
 
-    /// Notes on which surfaces the state is before and behind actions, and whether a multiplier stays at its end, for changes of the state before them and of what is asked for.
+    /// Notes on which surfaces the state is before and behind actions, and whether a multiplier stays at its end behind an instant, for
+    /// changes of the state before it and of what is asked for.
     fn land(
         &mut self,
         record: &InstantRecord,
@@ -787,6 +788,9 @@ impl<'w> Walk<'w> {
             return Ok(());
         }
         self.borders.ends_at_instant |= arrives && record.t[1] == self.t_last;
+        if map_has_sides(extended, record, &dt, &columns_before, &self.weights())? {
+            self.borders.acts_at_sides = Some(record.t[1]);
+        }
         let mut landed = surfaces_landed_on(after, record, &dt, &columns, arrives)?;
         if landed.is_empty() {
             landed = surfaces_at_action(before, record, &dt, &columns_before)?;

@@ -1,11 +1,15 @@
 //! Where a run begins, lands or ends at something that a changed run misses.
 
 use super::extended::{Column, Extended};
+use super::forms::add;
+use super::instant::Weights;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::Guard;
 use crate::record::InstantRecord;
-use crate::system::{Act, LieDerivatives, PiecewiseSystem, SignStructure};
+use crate::system::{
+    sides_of, Act, LieDerivatives, PiecewiseSystem, Setting, SignStructure, TracedSystem,
+};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -26,6 +30,8 @@ pub struct Borders {
     /// A law starts at one of its thresholds, beside which it has another value: derivatives by the start, and by parameters that
     /// move the threshold.
     pub starts_at_threshold: bool,
+    /// The first time at which an action finds the state where its map jumps, or the derivative of that: all derivatives from there.
+    pub acts_at_sides: Option<f64>,
     /// The last instant is at the end, and a changed run has it later, or is then beside a surface slid on: all derivatives there.
     pub ends_at_instant: bool,
 }
@@ -101,6 +107,75 @@ pub(super) fn surfaces_at_action(
     let moved = |(&dt, column): (&f64, &Vec<f64>)| Beside::moved(dt, column, record.field[0]);
     let moved: Vec<Beside> = dt.iter().zip(columns).map(moved).collect();
     Ok(surfaces_with_sides(piece, (record.t[0], &z), &moved)?.0)
+}
+
+/// Does the map of the first action of an instant jump where the state is, or its derivative, and does one of these columns, whose
+/// derivatives of the time are `dt`, lead off there?
+pub(super) fn map_has_sides(
+    extended: &Extended,
+    record: &InstantRecord,
+    dt: &[f64],
+    columns: &[Vec<f64>],
+    weights: &Weights,
+) -> Result<bool, FieldError> {
+    let Some(act) = record.acts.iter().find(|act| extended.moves(act.index)) else {
+        return Ok(false);
+    };
+    let Some(map) = extended.maps[act.index].as_ref() else {
+        return Ok(false);
+    };
+    let (t, z) = (record.t[0], extended.state(&act.x));
+    let moved = |(&dt, column): (&f64, &Vec<f64>)| Beside::moved(dt, column, record.field[0]);
+    let moved: Vec<Beside> = dt.iter().zip(columns).map(moved).collect();
+    let system = map.expressions;
+    let is_left = |normal: &[f64]| {
+        let normal = (0.0, normal.to_vec());
+        moved.iter().any(|change| change.leads_off(&normal))
+    };
+    let at = |signs: &[f64], z: &[f64]| map.with_signs((t, z), signs);
+    let signs = sides_of(system, (t, &z), &[])?;
+    has_sides((system, &[], 0), signs, (t, &z), (is_left, at), weights)
+}
+
+/// Does a function jump at a point across one of its surfaces, beginning with some, or its gradient, as far as the tolerance tells? What
+/// follows from the signs and the state are the values with their gradients; only surfaces count that motions beside this one leave.
+pub(super) fn has_sides(
+    (system, q, first): (&TracedSystem, &[f64], usize),
+    mut signs: Vec<f64>,
+    (t, z): (f64, &[f64]),
+    (is_left, at): (
+        impl Fn(&[f64]) -> bool,
+        impl Fn(&[f64], &[f64]) -> Result<Vec<f64>, FieldError>,
+    ),
+    weights: &Weights,
+) -> Result<bool, FieldError> {
+    let mut h = vec![0.0; system.n_surfaces()];
+    system.surfaces(&Setting::new(&signs, q).at(t, z), &mut h)?;
+    for j in first..h.len() {
+        let mut normal = vec![0.0; z.len()];
+        system.gradient(j, &Setting::new(&signs, q).at(t, z), &mut normal)?;
+        let error = weights.error(z, &normal);
+        if h[j].abs() > error || !is_left(&normal) {
+            continue;
+        }
+        // How large the values are by themselves: away from here by the size of the states.
+        let mut away = z.to_vec();
+        let factor = error / (weights.rtol * dot(&normal, &normal));
+        add(&mut away, factor, &normal);
+        let away = at(&signs, &away)?;
+        let one = at(&signs, z)?;
+        signs[j] = -signs[j];
+        let other = at(&signs, z)?;
+        signs[j] = -signs[j];
+        let share = weights.rtol.max(AT_SIDE);
+        let differ = |((one, other), away): ((&f64, &f64), &f64)| {
+            (one - other).abs() > share * one.abs().max(away.abs())
+        };
+        if one.iter().zip(&other).zip(&away).any(differ) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The derivatives of h_j by time and state, if a place is on the surface.

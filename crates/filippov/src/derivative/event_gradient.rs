@@ -1,6 +1,6 @@
 //! Functions of a user at a point of a motion: their values and derivatives, and what fixes the times of their zeros.
 
-use super::borders::differ;
+use super::borders::has_sides;
 use super::extended::extended_system;
 use super::instant::Weights;
 use super::piece::Piece;
@@ -8,9 +8,6 @@ use crate::error::{Error, FieldError};
 use crate::system::{sides_where, PiecewiseSystem, Rules, Setting, SignStructure, TracedSystem};
 use crate::tolerances::{AT_SIDE, EPS, ROUNDING};
 use crate::vectors::dot;
-
-/// What is nearer to zero than this share of the tolerance may be on either side of it.
-const NEAR: f64 = 0.1;
 
 /// The gradient of a function by time, states and parameters.
 pub struct EventGradient {
@@ -140,46 +137,30 @@ impl EventGradient {
         })
     }
 
-    /// Is a point, as far as the tolerance tells, where the function itself jumps, or its gradient does?
+    /// Does the function jump at a point across a surface of its own, or its gradient, as far as the tolerance tells?
     pub(super) fn has_sides(
         &self,
         piece: &Piece,
         (t, z): (f64, &[f64]),
         weights: &Weights,
     ) -> Result<bool, FieldError> {
-        let (system, n) = (&self.extended, piece.extended.n);
-        let mut signs = self.signs(piece, (t, z))?;
-        let one = self.with_signs(&signs, &piece.q, (t, z))?;
-        let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(&Setting::new(&signs, &piece.q).at(t, z), &mut h)?;
+        let signs = self.signs(piece, (t, z))?;
         let projection = piece.projection(&[], t, z)?;
-        for j in piece.signs.len()..h.len() {
-            let here = Setting::new(&signs, &piece.q).at(t, z);
-            let mut gradient = vec![0.0; z.len()];
-            system.gradient(j, &here, &mut gradient)?;
-            let size = weights.rtol * weights.length(&z[..n], (0.0, &gradient[..n]), 1.0);
-            if h[j].abs() > NEAR * size {
-                continue;
-            }
-            // Motions on the surfaces slid on, and in contact, do not leave what vanishes on these.
-            let whole = dot(&gradient, &gradient);
+        // Motions on the surfaces slid on, and in contact, do not leave what vanishes on these.
+        let is_left = |normal: &[f64]| {
+            let mut left = normal.to_vec();
             if let Some(projection) = &projection {
-                projection.pull_back(n, &mut gradient);
+                projection.pull_back(piece.extended.n, &mut left);
             }
-            if dot(&gradient, &gradient) <= AT_SIDE * AT_SIDE * whole {
-                continue;
-            }
-            signs[j] = -signs[j];
-            let other = self.with_signs(&signs, &piece.q, (t, z))?;
-            signs[j] = -signs[j];
-            let jump = (one.value - other.value).abs();
-            if jump > h[j].abs() + AT_SIDE * one.value.abs()
-                || differ(&one.gradient, &other.gradient)
-            {
-                return Ok(true);
-            }
-        }
-        Ok(false)
+            dot(&left, &left) > AT_SIDE * AT_SIDE * dot(normal, normal)
+        };
+        let at = |signs: &[f64], z: &[f64]| {
+            let mut found = self.with_signs(signs, &piece.q, (t, z))?;
+            found.gradient.push(found.value);
+            Ok(found.gradient)
+        };
+        let own = (&self.extended, &piece.q[..], piece.signs.len());
+        has_sides(own, signs, (t, z), (is_left, at), weights)
     }
 
     /// What fixes the time of a zero at a point of a motion; NaN where [`on`](Self::on) knows nothing.
@@ -244,7 +225,7 @@ impl EventGradient {
         let (n, rates) = (piece.extended.n, piece.rates(t, z)?);
         let (x, gradient) = (&z[..n], &zero.gradient[..n]);
         let unit = weights.time_of_change(t, x, &rates[..n]);
-        let tolerance = weights.rtol * weights.length(x, (0.0, gradient), unit);
+        let tolerance = weights.error(x, gradient);
         let by_parameters = zero.gradient[n..].iter().zip(&z[n..]);
         let rounding = by_parameters.map(|(g, p)| EPS * (g * (1.0 + p.abs())).abs());
         // The motion comes from a moment before.
@@ -253,7 +234,7 @@ impl EventGradient {
         let rate_before = self.rate(piece, (t - moment, &before), zero.inner)?;
         let bend = ((zero.rate - rate_before) / moment).abs();
         let beyond = zero.rate * zero.rate / (2.0 * bend);
-        Ok(beyond <= NEAR * tolerance + rounding.sum::<f64>())
+        Ok(beyond <= tolerance + rounding.sum::<f64>())
     }
 
     /// How fast the function changes along the motion, or that of a sign inside of it.

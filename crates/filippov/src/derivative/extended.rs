@@ -515,7 +515,7 @@ impl Definition {
 
 /// The derivative of the map of an action.
 pub(super) struct ExtendedMap<'a> {
-    expressions: &'a TracedSystem,
+    pub(super) expressions: &'a TracedSystem,
     /// The entries of its rows that may differ from zero: row and column.
     entries: Vec<(usize, usize)>,
     /// Their values, then the derivatives by the time.
@@ -567,18 +567,32 @@ impl<'a> ExtendedMap<'a> {
         (t, x): (f64, &[f64]),
         values: &[f64],
     ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
-        let expressions = self.expressions;
-        let signs = sides_of(expressions, (t, x), &[])?;
-        let z = [x, values].concat();
-        let mut out = vec![0.0; self.entries.len() + self.n];
-        let place = Place::new(t, &z, &signs);
-        expressions.eval(&self.derivative, &place, &[], &mut out);
+        let signs = sides_of(self.expressions, (t, x), &[])?;
+        let mut out = self.slopes((t, &[x, values].concat()), &signs);
         let by_time = out.split_off(self.entries.len());
         let mut rows = vec![vec![0.0; self.n + values.len()]; self.n];
         for (&(r, c), value) in self.entries.iter().zip(out) {
             rows[r][c] = value;
         }
         Ok((rows, by_time))
+    }
+
+    /// The derivatives that may differ from zero, then those by the time.
+    fn slopes(&self, (t, z): (f64, &[f64]), signs: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.entries.len() + self.n];
+        let place = Place::new(t, z, signs);
+        self.expressions
+            .eval(&self.derivative, &place, &[], &mut out);
+        out
+    }
+
+    /// The new state, and its derivatives, with these signs.
+    pub fn with_signs(&self, (t, z): (f64, &[f64]), signs: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut out = vec![0.0; self.n];
+        let place = Place::new(t, &z[..self.n], signs);
+        self.expressions.field(&place, &mut out)?;
+        out.extend(self.slopes((t, z), signs));
+        Ok(out)
     }
 
     /// The first and second derivatives of the new state at a place; `None` if the map cannot be compiled.

@@ -47,6 +47,9 @@ impl Lost {
     }
 }
 
+/// How wrong states are, in units of their tolerance.
+const ERROR: f64 = 0.1;
+
 /// By what time and states are measured in the condition of an instant.
 pub(super) struct Weights {
     /// When the run starts.
@@ -74,10 +77,15 @@ impl Weights {
     }
 
     /// The length of a gradient: how much a function changes if the time does so by a unit, and states by their size.
-    pub fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), unit: f64) -> f64 {
+    fn length(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), unit: f64) -> f64 {
         let pairs = x.iter().zip(gradient).enumerate();
         let by_state = pairs.map(|(i, (x, g))| (g * self.of(i, *x)).powi(2));
         ((by_time * unit).powi(2) + by_state.sum::<f64>()).sqrt()
+    }
+
+    /// What a function with this gradient may be wrong by: what is nearer to zero may be on either side of it.
+    pub fn error(&self, x: &[f64], gradient: &[f64]) -> f64 {
+        ERROR * self.rtol * self.length(x, (0.0, gradient), 1.0)
     }
 
     /// How many sizes of the states a motion goes in a time.

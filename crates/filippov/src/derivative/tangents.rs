@@ -1,7 +1,7 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{
-    differ, is_missed_later, starts_at_threshold, stays_at_end, surfaces_at_action,
+    differ, is_missed_later, map_has_sides, starts_at_threshold, stays_at_end, surfaces_at_action,
     surfaces_at_start, surfaces_landed_on, ticks_at_start, Borders, Kept,
 };
 use super::change::Row;
@@ -465,6 +465,13 @@ impl<'a> Tangents<'a> {
                 }
                 let lands_on = (!landed.is_empty()).then_some((record.t[1], landed));
                 self.found.borders.lands_on = lands_on;
+            }
+            if let (None, None, Some(last)) =
+                (self.found.borders.acts_at_sides, self.lost, all.last())
+            {
+                let (extended, columns) = (self.around.extended, &self.columns_before);
+                let has_sides = map_has_sides(extended, record, &last.dt, columns, &self.weights)?;
+                self.found.borders.acts_at_sides = has_sides.then_some(record.t[1]);
             }
             let replaced = record.replaces.then_some(Lost::Accumulation);
             for mut found in all {
