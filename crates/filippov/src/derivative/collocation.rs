@@ -27,7 +27,7 @@ fn error_by([before, last]: [f64; 2]) -> f64 {
 
 /// A value below this share of the largest counts as one of this size: what rounding leaves of a zero looks rough, and so does all
 /// that follows from it. Derivatives of the field by differences are known to fewer digits.
-const LEAST: f64 = 1e-8;
+const LEAST: f64 = 1e-5;
 const LEAST_BY_DIFFERENCES: f64 = 1e-4;
 
 /// The fastest rate of a sliding motion is seen in so many applications of its derivative.
@@ -236,7 +236,12 @@ impl Collocation {
     fn error_of(&self, highest: &[[f64; 2]], sizes: &[f64]) -> f64 {
         let largest = sizes.iter().fold(0.0_f64, |most, size| size.max(most));
         let sizes = sizes.iter().map(|size| size.max(self.least * largest));
-        let pairs = highest.iter().zip(sizes).filter(|(_, size)| *size > 0.0);
+        // A change that has died out has lost its digits.
+        let is_there = |size: f64| size > f64::MIN_POSITIVE / EPS;
+        let pairs = highest
+            .iter()
+            .zip(sizes)
+            .filter(|(_, size)| is_there(*size));
         let errors = pairs.map(|(highest, size)| error_by(highest.map(|c| c / size)));
         errors.fold(0.0, f64::max)
     }
