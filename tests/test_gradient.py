@@ -584,3 +584,28 @@ def test_the_kink_of_a_cost_on_which_a_body_sticks_is_none_of_its_gradient() -> 
     value, slopes = fl.gradient(system, (0, 3), [0.0, 1.0], terminal=lambda t, x: abs(x[1]) + x[0])
     assert value == pytest.approx(1.0)  # 1 / (2 (1 - F))
     assert slopes["F"] == pytest.approx(2.0)
+
+
+def test_a_tick_while_a_body_sticks_has_no_sides() -> None:
+    """A changed run sticks too when the clock ticks: no warning, on the way back neither."""
+
+    def driven(t: float, x: Any, F: float, T: float) -> Any:
+        return [x[1], -x[0] + 0.9 * np.sin(1.3 * t) - F * np.sign(x[1]) + 0.2 * fl.square(t, T, 0.5)]
+
+    reset = fl.Reset(times=[0.4], set={"u": lambda t, x: 1.0 + abs(x[1])})
+    plain = fl.System(driven, n=2, params={"F": 0.6, "T": 1.1})
+    sampled = fl.System(
+        lambda t, x, u, F, T: [x[1], driven(t, x, F, T)[1] * u],
+        n=2,
+        params={"F": 0.6, "T": 1.1},
+        discrete={"u": 1.0},
+        resets=reset,
+    )
+    for system in (plain, sampled):
+        sol = system.solve((0.05, 8), [1.0, 0.3], wrt="params")
+        ticks = [switch for switch in sol.switches if switch.kind == "clock"]
+        assert not sol.warnings
+        assert any(tick.mode_before[0] == 0 for tick in ticks)
+        value, slopes = fl.gradient(system, (0.05, 8), [1.0, 0.3], terminal=lambda t, x: x[0])
+        assert value == pytest.approx(sol.y[0, -1])
+        np.testing.assert_allclose(list(slopes.values()), sol.derivative()[0], rtol=1e-7, atol=1e-9)

@@ -774,6 +774,8 @@ impl<'w> Walk<'w> {
         let parameters = others.filter(|kind| matches!(kind, Column::Parameter(_)));
         let kinds: Vec<Column> = states.chain(parameters).collect();
         let mut columns = extended.columns_at_start(&kinds, &[]);
+        // A changed run is on the surfaces slid on too.
+        before.project(record.t[0], &extended.state(record.x[0]), &mut columns)?;
         let columns_before = columns.clone();
         let dt: Vec<f64> = columns.iter().map(|c| dot(&last.time, c)).collect();
         let mut arrives = false;

@@ -17,14 +17,6 @@ const MOST_ITERATED: usize = 16;
 const MOST_ITERATIONS: usize = 40;
 const CONTRACTION: f64 = 0.5;
 
-/// The error of a part by the highest coefficient of the rates along it, both relative to the size of a value. It goes with the square:
-/// the quadrature is exact for polynomials of about twice the degree. The coefficient before it tells about the highest one too,
-/// which may be zero by chance.
-fn error_by([before, last]: [f64; 2]) -> f64 {
-    let highest = last.abs().max(0.7 * before.abs().powf(7.0 / 6.0));
-    0.03 * highest * highest
-}
-
 /// A value below this share of the largest counts as one of this size: what rounding leaves of a zero looks rough, and so does all
 /// that follows from it. Derivatives of the field by differences are known to fewer digits.
 const LEAST: f64 = 1e-5;
@@ -71,6 +63,14 @@ enum Way {
     Iteration,
     /// The sparse matrix is factored, or its transpose, if it has an inverse.
     Sparse(bool),
+}
+
+/// The error of a part by the highest coefficient of the rates along it, both relative to the size of a value. It goes with the square:
+/// the quadrature is exact for polynomials of about twice the degree. The coefficient before it tells about the highest one too,
+/// which may be zero by chance.
+fn error_by([before, last]: [f64; 2]) -> f64 {
+    let highest = last.abs().max(0.7 * before.abs().powf(7.0 / 6.0));
+    0.03 * highest * highest
 }
 
 /// About how many operations a part takes with so many changes of n states.
@@ -216,23 +216,35 @@ impl Collocation {
         for stage in stages {
             raise(&mut sizes, stage);
         }
-        let error = self.error_of(&highest, &sizes);
-        if error.is_nan() || error <= self.allowed {
-            return error;
-        }
-        // What rounding leaves of a value looks rough. It is small beside the terms of the value.
-        self.look_at(nodes);
-        let mut terms: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
-        for (i, stage) in stages.iter().enumerate() {
-            let by_parameters = self.by_parameters(nodes[i].rows(), column);
-            let dt = self.dt * INTEGRALS[STAGES - 1][i];
-            self.nodes[i].add_terms(stage, &by_parameters, dt, &mut terms);
-        }
-        raise(&mut sizes, &terms);
-        self.error_of(&highest, &sizes)
+        let terms = |own: &Self| {
+            let mut terms: Vec<f64> = column[..n].iter().map(|v| v.abs()).collect();
+            for (i, stage) in stages.iter().enumerate() {
+                let by_parameters = own.by_parameters(nodes[i].rows(), column);
+                let dt = own.dt * INTEGRALS[STAGES - 1][i];
+                own.nodes[i].add_terms(stage, &by_parameters, dt, &mut terms);
+            }
+            terms
+        };
+        self.error_with_terms(nodes, &highest, (sizes, terms))
     }
 
-    /// The largest error of values of these sizes.
+    /// The largest error of values of these sizes. What rounding leaves of a value looks rough: it is small beside the terms that the
+    /// value is made of, which are asked for if they are needed.
+    fn error_with_terms(
+        &mut self,
+        nodes: &[Linearisation],
+        highest: &[[f64; 2]],
+        (mut sizes, terms): (Vec<f64>, impl FnOnce(&Self) -> Vec<f64>),
+    ) -> f64 {
+        let error = self.error_of(highest, &sizes);
+        if error <= self.allowed {
+            return error;
+        }
+        self.look_at(nodes);
+        raise(&mut sizes, &terms(self));
+        self.error_of(highest, &sizes)
+    }
+
     fn error_of(&self, highest: &[[f64; 2]], sizes: &[f64]) -> f64 {
         let largest = sizes.iter().fold(0.0_f64, |most, size| size.max(most));
         let sizes = sizes.iter().map(|size| size.max(self.least * largest));
@@ -319,14 +331,8 @@ impl Collocation {
         let highest: Vec<[f64; 2]> = highest.collect();
         let mut sizes: Vec<f64> = gradient.iter().map(|v| v.abs()).collect();
         raise(&mut sizes, end);
-        let error = self.error_of(&highest, &sizes);
-        if error.is_nan() || error <= self.allowed {
-            return error;
-        }
-        self.look_at(nodes);
-        let terms = self.terms_back(nodes, gradient, weights);
-        raise(&mut sizes, &terms);
-        self.error_of(&highest, &sizes)
+        let terms = |own: &Self| own.terms_back(nodes, gradient, weights);
+        self.error_with_terms(nodes, &highest, (sizes, terms))
     }
 
     /// Takes what was found by [`carry`](Self::carry) or [`pull_back`](Self::pull_back).

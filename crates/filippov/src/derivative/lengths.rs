@@ -60,7 +60,7 @@ impl Lengths {
 
     /// Is this error of the last part small enough for the part to be taken? The next one is as long as it tells.
     pub fn takes(&mut self, error: f64) -> bool {
-        let is_taken = error <= self.allowed || self.dt <= self.least || error.is_nan();
+        let is_taken = error <= self.allowed || self.dt <= self.least;
         if is_taken {
             self.left = match self.dt < self.left {
                 true => self.left - self.dt,
