@@ -423,8 +423,21 @@ fn surfaces_with_sides(
             }
         }
     }
+    // Places on both sides of a surface that the motion stays on come to a surface slid on that has a kink there.
+    let mut still_kept = Vec::new();
+    for k in kept {
+        let mut has_kink = false;
+        for j in piece.sliding.clone() {
+            has_kink |= has_kink_on(piece, j, k, (t, z))?;
+        }
+        match has_kink {
+            true => all.push(k),
+            false => still_kept.push(k),
+        }
+    }
     all.sort_unstable();
-    Ok((all, kept))
+    all.dedup();
+    Ok((all, still_kept))
 }
 
 /// Does the function of surface `j` have a kink on surface `k` at a place?
