@@ -3,9 +3,9 @@
 use super::event_gradient::EventGradient;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
-use super::instant::Weights;
 use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
+use super::weights::Weights;
 use crate::error::FieldError;
 use crate::options::Options;
 use crate::record::{Side, Solution};

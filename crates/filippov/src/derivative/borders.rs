@@ -2,8 +2,8 @@
 
 use super::extended::{Column, Extended};
 use super::forms::add;
-use super::instant::Weights;
 use super::piece::{Piece, Surroundings};
+use super::weights::Weights;
 use crate::error::FieldError;
 use crate::motion::Guard;
 use crate::record::InstantRecord;

@@ -2,8 +2,8 @@
 
 use super::borders::has_sides;
 use super::extended::extended_system;
-use super::instant::Weights;
 use super::piece::Piece;
+use super::weights::Weights;
 use crate::error::{Error, FieldError};
 use crate::system::{sides_where, PiecewiseSystem, Rules, Setting, SignStructure, TracedSystem};
 use crate::tolerances::{AT_SIDE, EPS, ROUNDING};

@@ -30,6 +30,7 @@ mod radau;
 mod second;
 mod series;
 mod tangents;
+mod weights;
 
 pub use adjoint::{CostGradient, Stretch, Term, TermPoint, Trail, Walk, WayBack, When};
 pub use between::{Differentiated, DifferentiatedRun};

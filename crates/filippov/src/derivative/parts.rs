@@ -4,9 +4,10 @@
 //! what each does by itself. If all orders agree the derivative goes on; else it is one-sided.
 
 use super::change::Row;
-use super::instant::{Instant, Lost, Passage, Weights};
+use super::instant::{Instant, Lost, Passage};
 use super::one_sided::{agree, orders, Cone, MOST_AT_ONCE};
 use super::piece::Piece;
+use super::weights::Weights;
 use crate::error::FieldError;
 use crate::record::InstantRecord;
 use crate::system::{Act, PiecewiseSystem};

@@ -4,9 +4,10 @@ use smallvec::SmallVec;
 
 use super::change::{matrices, Row};
 use super::forms::Second;
-use super::instant::{Instant, Lost, Passage, Weights};
+use super::instant::{Instant, Lost, Passage};
 use super::one_sided::{agree, OneSided};
 use super::second::{SecondOrder, Timed};
+use super::weights::Weights;
 use crate::error::FieldError;
 use crate::tolerances::AT_SIDE;
 use crate::vectors::{dot, dot_magnitude};

@@ -7,11 +7,12 @@ use super::borders::{
 use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Moved, Second};
-use super::instant::{arrival, brought_by, Instant, Lost, Weights};
+use super::instant::{arrival, brought_by, Instant, Lost};
 use super::limit::History;
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
 use super::second::{at_start, behind, Timed};
+use super::weights::Weights;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Keep, Options};
