@@ -137,8 +137,8 @@ pub(super) fn map_has_sides(
     has_sides((system, &[], 0), signs, (t, &z), (is_left, at), weights)
 }
 
-/// Does a function jump at a point across one of its surfaces, beginning with some, or its gradient, as far as the tolerance tells? What
-/// follows from the signs and the state are the values with their gradients; only surfaces count that motions beside this one leave.
+/// Does a function jump at a point across one of its surfaces, or its gradient, as far as the tolerance tells? `at` returns its values and
+/// their gradients, for these signs and this state. Surfaces count from the place `first` on, if motions beside this one leave them.
 pub(super) fn has_sides(
     (system, q, first): (&TracedSystem, &[f64], usize),
     mut signs: Vec<f64>,

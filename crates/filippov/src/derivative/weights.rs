@@ -1,4 +1,4 @@
-//! By what time and states are measured.
+//! By what time and states are measured: states by their size, or by their tolerance if they are small.
 
 use crate::options::Options;
 use crate::vectors::dot;
