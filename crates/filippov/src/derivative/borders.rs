@@ -158,7 +158,7 @@ pub(super) fn has_sides(
         if h[j].abs() > error || !is_left(&normal) {
             continue;
         }
-        // How large the values are by themselves: away from here by the size of the states.
+        // The values a part of the size of the states away from here tell how large they are by themselves.
         let mut away = z.to_vec();
         let factor = error / (weights.rtol * dot(&normal, &normal));
         add(&mut away, factor, &normal);

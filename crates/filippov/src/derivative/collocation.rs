@@ -286,6 +286,7 @@ impl Collocation {
     fn weights(&mut self, nodes: &[Linearisation], gradient: &[f64]) -> Vec<f64> {
         if matches!(self.way, Way::Iteration) {
             if let Some(weights) = self.iterate_back(nodes, gradient) {
+                self.take_right(nodes);
                 return weights;
             }
             self.way = Way::Sparse(self.factor_sparse(nodes, true));
@@ -360,7 +361,6 @@ impl Collocation {
             return;
         }
         self.look_at(nodes);
-        self.take_right(nodes);
         self.way = Way::Iteration;
     }
 
@@ -462,7 +462,7 @@ impl Collocation {
             let is_small = change <= self.rest * size;
             if is_small && self.are_small(&changes, &self.terms_back(nodes, gradient, &u)) {
                 integrate_back(&v, &mut u);
-                let mut weights = Vec::with_capacity(self.right.n_rows());
+                let mut weights = Vec::new();
                 for (node, u) in self.nodes.iter().zip(&u) {
                     node.rates_back(u, &mut back, &mut multipliers);
                     weights.extend_from_slice(u);

@@ -213,8 +213,8 @@ impl EventGradient {
         Ok(found)
     }
 
-    /// Does what fixes the time of a zero turn back there, as far as the tolerance tells? By parabola it goes beyond zero by
-    /// rate^2 / (2 |rate'|). The time of a touch has no derivative.
+    /// Does what fixes the time of a zero turn back there, as far as the tolerance tells? A parabola with its rate and the change of this
+    /// goes beyond zero by rate^2 / (2 |rate'|). The time of a touch has no derivative.
     pub(super) fn touches(
         &self,
         piece: &mut Piece,

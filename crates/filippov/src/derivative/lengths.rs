@@ -68,7 +68,7 @@ impl Lengths {
             };
         }
         let factor = SAFETY * (self.allowed / error).powf(1.0 / ORDER);
-        // An error of zero tells nothing but that the part may be longer.
+        // The next part is longer if there was no error at all, but not by more than after any other part.
         self.dt = (self.dt * factor.clamp(SHORTER, LONGER)).max(self.least);
         is_taken
     }

@@ -89,11 +89,17 @@ pub(super) const WEIGHTS: [[f64; STAGES]; STAGES] = [
 pub(super) const HIGHEST: [[f64; STAGES]; 2] = [legendre(5), legendre(6)];
 
 /// What makes of the differences Y_j - Y_0 the two highest coefficients of dt Y'.
-pub(super) const HIGHEST_RATES: [[f64; STAGES]; 2] = [rates(HIGHEST[0]), rates(HIGHEST[1])];
+pub(super) const HIGHEST_RATES: [[f64; STAGES]; 2] = [
+    of_equations(HIGHEST[0], false),
+    of_equations(HIGHEST[1], false),
+];
 
 /// What makes of U, w times the gradient at the nodes, the two highest coefficients of dt Df^T U / w, where the part of the gradient at
 /// the end has yet to be taken off.
-pub(super) const HIGHEST_BACK: [[f64; STAGES]; 2] = [back(HIGHEST[0]), back(HIGHEST[1])];
+pub(super) const HIGHEST_BACK: [[f64; STAGES]; 2] = [
+    of_equations(HIGHEST[0], true),
+    of_equations(HIGHEST[1], true),
+];
 
 /// A Legendre polynomial on the interval from 0 to 1, divided by the integral of its square, at the nodes.
 const fn legendre(degree: u32) -> [f64; STAGES] {
@@ -113,30 +119,17 @@ const fn legendre(degree: u32) -> [f64; STAGES] {
     out
 }
 
-const fn rates(highest: [f64; STAGES]) -> [f64; STAGES] {
+/// The sum of h_j w_j W_ji over j, or of h_j W_ij on the way back.
+const fn of_equations(highest: [f64; STAGES], is_back: bool) -> [f64; STAGES] {
     let mut out = [0.0; STAGES];
-    let mut i = 0;
-    while i < STAGES {
-        let mut j = 0;
-        while j < STAGES {
-            out[i] += highest[j] * INTEGRALS[STAGES - 1][j] * WEIGHTS[j][i];
-            j += 1;
-        }
-        i += 1;
-    }
-    out
-}
-
-const fn back(highest: [f64; STAGES]) -> [f64; STAGES] {
-    let mut out = [0.0; STAGES];
-    let mut i = 0;
-    while i < STAGES {
-        let mut j = 0;
-        while j < STAGES {
-            out[i] += WEIGHTS[i][j] * highest[j];
-            j += 1;
-        }
-        i += 1;
+    let mut place = 0;
+    while place < STAGES * STAGES {
+        let (i, j) = (place / STAGES, place % STAGES);
+        out[i] += match is_back {
+            true => highest[j] * WEIGHTS[i][j],
+            false => highest[j] * INTEGRALS[STAGES - 1][j] * WEIGHTS[j][i],
+        };
+        place += 1;
     }
     out
 }
